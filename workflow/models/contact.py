@@ -1,4 +1,4 @@
-"""Contacts of a model: what they are made of, how they wear, and one face on its grid."""
+"""Contacts of a model: their materials and laws, their wear settings, and one face on its grid."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ WearStepper = Stepper[WearState, WearingContact]
 
 MOTIONS = "auto", "follow", "neglect"
 STEPS = "implicit", "second_order", "explicit"
-# Jumps in which a run is recorded whose explicit steps are a fraction of their stability limit:
-# the steps themselves are too short to be recorded one by one.
+# A run with explicit steps, a fraction of their stability limit each, is recorded in this many
+# jumps: single steps are too short to record.
 RECORDS = 10
 
 
-# --- what is given --------------------------------------------------------------------------------
+# --- settings -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Contact:
-    """What a contact is made of, and how it is computed.
+    """Materials, wear laws and friction of a contact, and how it is solved.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Contact:
         Pressure of the half-space under the slips of the loads; pressure, shear and slip of the
         half-space; or no half-space: the nodes of the structure wear.
     link : {"corrected", "half_space"}
-        Whether bodies deform as their structure says where it knows, or as half-spaces.
+        Whether bodies deform as their structure does, where it is known, or as half-spaces.
     gross_slip : {"force", "energies"}
         How a face that slides as a whole finds its direction (``method`` "full"): with the shear
         force of the loads, or sharing their energy between x and y.
@@ -104,7 +104,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class Wear:
-    """How far contacts wear, in which steps, and when worn surfaces change their loads.
+    """Length and steps of the wear of contacts, and when worn surfaces change their loads.
 
     Without ``jump`` and ``fraction`` the length of steps is chosen for an error of the depth.
 
@@ -167,14 +167,14 @@ class Wear:
         return self.jump == JumpSize() and self.fraction is None
 
     def error_control(self) -> ErrorControl | None:
-        """Return what chooses the length of steps, or None where it is given."""
+        """Return the control that chooses the length of steps, or None if the length is given."""
         if not self.automatic:
             return None
         relative = self.tolerance if self.depth_tolerance is None else None
         return ErrorControl(relative, self.depth_tolerance)
 
     def stepper(self) -> WearStepper:
-        """Return what advances the surfaces of a half-space contact."""
+        """Return the stepper that advances the surfaces of a half-space contact."""
         if self.steps == "explicit":
             return ExplicitStepper(self.fraction)
         control = self.error_control()
@@ -193,10 +193,10 @@ class Wear:
 
 @dataclass(frozen=True)
 class ContactEnd:
-    """A cycle on the surfaces that a run ends with.
+    """A cycle on the surfaces at the end of a run.
 
-    ``pressure_of_companion`` ``(t, nx, ny)`` [MPa] is that on the surfaces which steps of twice the
-    length leave; None where no such steps were taken.
+    ``pressure_of_companion`` ``(t, nx, ny)`` [MPa] is the pressure on the surfaces of the run with
+    steps of twice the length; None if no such steps were taken.
     """
 
     tractions: CycleTractions
@@ -211,11 +211,11 @@ class FaceContact(InterfaceContact):
     face : ContactFace
         The face and the gap over it.
     contact : Contact
-        What the contact is made of.
+        Materials, laws and settings of the contact.
     wear : Wear
-        How it wears.
+        Wear settings.
     stepper : Stepper, optional
-        Steps in the place of those of ``wear``.
+        Stepper to use instead of that of ``wear``.
     """
 
     transfer: FaceTransfer
@@ -255,7 +255,7 @@ class FaceContact(InterfaceContact):
         return contact.solve(gap, **load, start=None, compliance=None).pressure
 
     def face_of(self, body: Literal[1, 2]) -> Face:
-        """Return the face of one body, with its own nodes."""
+        """Return the face of one body, with the nodes of that body."""
         return self.face.face(body)
 
     def transfer_of(self, body: Literal[1, 2]) -> FaceTransfer:
@@ -264,15 +264,15 @@ class FaceContact(InterfaceContact):
         return self.transfer if face is self.face else FaceTransfer.between(face, self.grid)
 
     def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
-        """Return the worn depths of both bodies at their own nodes [mm]; volumes are kept."""
+        """Return the worn depths of both bodies at their own nodes [mm]; volumes are preserved."""
         surfaces = state.surfaces
         to_1 = self.transfer_of(1)
         return to_1.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
 
     def seen(self, state: InterfaceState, increment: int) -> InterfaceState:
-        """Return the part of a state that :meth:`fields` of an increment need.
+        """Return the part of a state that :meth:`fields` needs for an increment.
 
-        It is a tenth of the state where slips are given, and quicker to send to a process.
+        Where slips are given it is about a tenth of the state, and faster to send to a process.
         """
         if self.settings.method == "full":
             return state
@@ -280,7 +280,7 @@ class FaceContact(InterfaceContact):
         return replace(state, starts=starts, coarse=None)
 
     def end(self, state: InterfaceState) -> ContactEnd:
-        """Return a cycle on the surfaces of a state that a run ends with."""
+        """Return the cycle on the surfaces at the end of a run."""
         companion, pressure = state.coarse, None
         if step_errors(state, self.areas) is not None and isinstance(companion, InterfaceState):
             pressure = self.tractions(companion).pressure
@@ -299,7 +299,7 @@ def gap_on(face: ContactFace, grid: Grid) -> Array:
 
 
 def _follow(contact: Contact, wear: Wear) -> bool | None:
-    """Return whether to follow surfaces that move over each other; None: where that counts."""
+    """Return whether to follow surfaces that move over each other; None to decide by the motion."""
     follow = {"auto": None, "follow": True, "neglect": False}[wear.motion]
     if follow is None and getattr(contact.laws[0], "coefficient", None) == 0.0:
         return False  # a surface that does not wear looks the same everywhere

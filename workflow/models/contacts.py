@@ -1,4 +1,4 @@
-"""All contacts of a model, as the coupled loop asks them."""
+"""All contacts of a model, as the coupled loop calls them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class FaceContacts(ReportsProgress, Contacts):
         self.stages = list(stages)
 
     def restored(self, state: CoupledState) -> CoupledState:
-        """Return a stored state with what had not to be stored."""
+        """Return a stored state, completed by the parts that are not stored."""
         return state
 
     @property

@@ -126,7 +126,7 @@ class DovetailJoint:
 
     @property
     def heaviest(self) -> int:
-        """The mission of the highest speed; of several, the one of the largest moment."""
+        """Index of the mission with the highest speed and, among equal ones, the largest moment."""
         peaks = [(m.rotation_speed, abs(m.aerodynamic_moment)) for m in self.missions]
         return peaks.index(max(peaks))
 
@@ -187,7 +187,7 @@ class DovetailJoint:
         """Return None: the mesh is generated."""
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
-        """Return whether the joint locks itself, and sides that a moment would move."""
+        """Yield remarks: sides that a moment would move, and a joint that locks itself."""
         moments = any(mission.aerodynamic_moment for mission in self.missions)
         if moments and self.sides == "guided" and self.geometry.skew == 0.0:
             yield Remark(
@@ -208,7 +208,7 @@ class DovetailJoint:
 def dovetail_mesh(
     geometry: Dovetail, mesh: DovetailMesh, dimension: Literal[2, 3]
 ) -> StructureMesh:
-    """Return the mesh of both bodies without added gaps; the last one is kept.
+    """Return the mesh of both bodies without added gaps; the last mesh is cached.
 
     Raises MeshError where the section cannot be drawn.
     """

@@ -15,7 +15,7 @@ GapFunction = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True)
 class AddedGap:
-    """A gap that comes on top of the form of a contact face, such as a measured or worn profile.
+    """A gap added to the form of a contact face, such as a measured or worn profile.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class AddedGap:
 
 @dataclass(frozen=True)
 class _Sum:
-    """The sum of two gaps; unlike a nested function it can be sent to another process."""
+    """The sum of two gaps; unlike a nested function, it can be sent to another process."""
 
     form: GapFunction
     added: GapFunction
@@ -64,13 +64,13 @@ class _Sum:
 
 @dataclass(frozen=True)
 class GridHeights:
-    """Heights ``(nx, ny)`` [mm] at the centres of a grid; bilinear between and beyond them."""
+    """Heights ``(nx, ny)`` [mm] at the centres of a grid, with bilinear interpolation."""
 
     grid: Grid
     heights: Array
 
     def __call__(self, x: Array, y: Array) -> Array:
-        """Return heights at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``; on the grid as they are."""
+        """Return heights at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``; on the grid, those given."""
         grid = self.grid
         if np.array_equal(x, grid.x) and np.array_equal(y, grid.y):
             return self.heights
@@ -81,10 +81,10 @@ class GridHeights:
 
 
 def _linear(known: Array, wanted: Array) -> Array:
-    """Return weights ``(m, n)`` of values at ``known`` ``(n,)``, ascending, for ``wanted``."""
+    """Return weights ``(m, n)`` from ascending ``known`` ``(n,)`` points to ``wanted`` ones."""
     if len(known) == 1:
         return np.ones((len(wanted), 1))
-    # A fifth of a second to import: where it is used.
+    # Importing this takes a fifth of a second, so it is imported only where it is used.
     from scipy.interpolate import make_interp_spline
 
     return np.asarray(make_interp_spline(known, np.eye(len(known)), k=1)(wanted))

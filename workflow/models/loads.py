@@ -1,4 +1,4 @@
-"""Where a wear run gets the loads of its contacts from: a structure of ours, or a file."""
+"""Loads of the contacts of a wear run: their interface, and sources that wear does not change."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads, FaceLoads
 
 BODIES: tuple[Literal[1, 2], ...] = (1, 2)
-# Without a mesh, the grid that shows what a coarse one misses has cells so many times larger.
+# Without a mesh, the grid that shows the resolution error has cells larger by this factor.
 COARSER = 4
-# Cells below which a contact is hardly one.
+# Least number of cells along an axis that can represent a contact.
 FEWEST = 8
 
 
@@ -37,9 +37,9 @@ class ContactFace:
     coarse : (int, int)
         About as many cells as the face has nodes.
     remedy : str
-        What to do where the contact reaches the end of the face, for messages.
+        Advice if the contact reaches the end of the face, for messages.
     drive : Drive
-        Motions that are imposed in the place of forces of the loads.
+        Motions that are imposed instead of forces of the loads.
 
     Examples
     --------
@@ -69,7 +69,7 @@ class ContactFace:
         line: bool = False,
         drive: Drive | None = None,
     ) -> Self:
-        """Return a face without a mesh, of a ``size`` [mm]; the loads know its corners alone.
+        """Return a face without a mesh, of a ``size`` [mm]; its nodes are its corners.
 
         A ``line`` contact extends along x, with loads per length.
         """
@@ -84,10 +84,10 @@ class ContactFace:
 
 @dataclass(frozen=True)
 class UserFace:
-    """Nodes that the user has numbered, of the face of body 1 or 2 of an interface.
+    """Nodes with numbers of the user's mesh, on the face of body 1 or body 2 of an interface.
 
-    They are those of the contact's own face, or lie at ``points`` ``(n, 3)`` [mm] in the user's
-    axes, in which the face has its ``frame``.
+    They are the nodes of the contact face, or lie at ``points`` ``(n, 3)`` [mm] in the user's axes,
+    in which ``frame`` is the frame of the face.
     """
 
     body: Literal[1, 2]
@@ -97,7 +97,7 @@ class UserFace:
 
 
 class LoadSource(load_sources.LoadSource, Protocol):
-    """A source of loads for the coupled loop, with what a run asks of it beside that."""
+    """A source of loads for the coupled loop, with the further data that a run needs."""
 
     @property
     def faces(self) -> tuple[ContactFace, ...]: ...
@@ -114,19 +114,19 @@ class LoadSource(load_sources.LoadSource, Protocol):
 
     @property
     def slip_known(self) -> bool:
-        """Whether its loads say how faces slip and what that dissipates; else both are 0 there."""
+        """Whether the loads include slip and dissipated energy; otherwise both are 0."""
         ...
 
     def prepare(self) -> None:
-        """Do the costly part now."""
+        """Carry out the costly part of the computation now."""
         ...
 
     def unworn(self) -> Sequence[FaceLoads]:
-        """The closed cycle with unworn faces."""
+        """Return the closed cycle with unworn faces."""
         ...
 
     def user_faces(self, number: int) -> Sequence[UserFace]:
-        """Where the worn surfaces of interface ``number`` go back to nodes of the user's own."""
+        """Return the user's nodes that receive the worn surfaces of interface ``number``."""
         ...
 
 
@@ -134,7 +134,7 @@ class UncoupledSource(ABC):
     """Base of sources of loads that wear does not change.
 
     A subclass has the ``faces``, whether they are ``line`` contacts, the increment of ``peak`` load
-    and :meth:`unworn`, the closed cycle of loads and slips.
+    and :meth:`unworn`, which returns the closed cycle of loads and slips.
 
     Examples
     --------
@@ -190,14 +190,14 @@ class UncoupledSource(ABC):
         return np.array([cycle.loads.resultants[self.peak] for cycle in cycles])
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
-        """Return no faces: there are no nodes of the user's own."""
+        """Return no faces: the loads have no mesh with the user's node numbers."""
         return ()
 
 
 def nominal_face(
     name: str, size: tuple[float, float], line: bool, frame: Frame | None = None
 ) -> Face:
-    """A face of which nothing is known but its ``size`` [mm]: its nodes are its corners."""
+    """Return a face of which only the ``size`` [mm] is known: its nodes are its corners."""
     x, y = 0.5 * size[0], 0.5 * size[1]
     corners, facets = [[-x, -y], [x, -y], [x, y], [-x, y]], [[0, 1, 2], [0, 2, 3]]
     if line:
@@ -207,5 +207,5 @@ def nominal_face(
 
 
 def coarse_cells(nx: float, ny: float, line: bool) -> tuple[int, int]:
-    """About so many cells along x and y, but enough for a contact."""
+    """Return a grid of about nx by ny cells, but enough for a contact."""
     return max(FEWEST, round(nx)), 1 if line else max(FEWEST, round(ny))

@@ -24,7 +24,7 @@ from workflow.errors import UserError
 
 @dataclass(frozen=True)
 class TangentialLoops:
-    """Tangential loops that measure a contact now and then while it wears.
+    """Settings of tangential loops that measure a contact at times while it wears.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class TangentialLoops:
         return self.every == "jump" or jump == 0 or ended
 
     def path(self, name: str, state: InterfaceState, peak: int, tilt: Tilt = "free") -> LoopPath:
-        """Return what a loop imposes on the contact ``name`` under its loads at ``peak``.
+        """Return the path that a loop imposes on the contact ``name`` under its loads at ``peak``.
 
         Raises UserError for a contact without load.
         """
@@ -84,8 +84,8 @@ class TangentialLoops:
 class WornLoop:
     """A tangential loop on worn surfaces.
 
-    ``values`` are what it measures, by name, in base units; ``displacement`` [mm] and ``force`` [N]
-    ``(k,)`` are its curve, first loading included.
+    ``values`` are the measured quantities by name, in base units. ``displacement`` [mm] and
+    ``force`` [N] ``(k,)`` are the curve, first loading included.
     """
 
     values: dict[str, float]
@@ -104,10 +104,10 @@ def worn_loop(
 ) -> WornLoop:
     """Return the loop of the contact ``name`` in its present state, under its loads at ``peak``.
 
-    The loads widen the gap by ``lift`` ``(nx, ny)`` [mm]. The ``tilt`` is held, or free under their
-    moments. A normal force of the loop's own acts along the same line, and lifts by its share of
-    the load. Raises ContactFailure if the loop does not converge or friction cannot carry it,
-    UserError for a contact without load.
+    The loads widen the gap by ``lift`` ``(nx, ny)`` [mm]. The ``tilt`` is held, or free under the
+    moments of the loads. A normal force given for the loop acts along the same line; lift and
+    moments scale with its ratio to the load. Raises ContactFailure if the loop does not converge or
+    friction cannot carry it, and UserError for a contact without load.
     """
     path = loops.path(name, state, peak, tilt)
     height = state.surfaces.gap + _share(path.P, state, peak) * lift
@@ -143,6 +143,6 @@ def worn_loop(
 
 
 def _share(force: float, state: InterfaceState, peak: int) -> float:
-    """Return a normal force over that at peak load; 0 where that is none."""
+    """Return the ratio of a normal force to that at peak load; 0 if there is no load."""
     P = float(state.loads.P[peak])
     return force / P if P > 0.0 else 0.0

@@ -1,9 +1,9 @@
-"""Finite elements alone: the nodes of a structure's contact faces wear, without a half-space.
+"""Wear at the nodes of a structure's contact faces, by finite elements without a half-space.
 
-Every cycle of the wear is one of the structure, on the surfaces at hand: half the slip before a
-solved state and half the slip after it count at its pressure (:mod:`sa_solver.cycles.increments`).
-What is written lies on the contact grid, like a half-space's: means of the nodal fields over its
-cells.
+Every wear cycle solves one cycle of the structure on the present surfaces. Half of the slip before
+and half of the slip after a solved state count at its pressure
+(:mod:`sa_solver.cycles.increments`). Written fields lie on the contact grid, as with a half-space:
+cell means of the nodal fields.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from workflow.models.contacts import FaceContacts
 from workflow.models.loads import ContactFace
 from workflow.models.structure import StructureLoads
 
-# Cycles that are kept: those before and after a jump, and the same of its companion.
+# Number of stored cycles: before and after a jump, of the run and of its coarse companion.
 KEPT = 4
 
 
@@ -42,9 +42,8 @@ KEPT = 4
 class StructureCycle:
     """A closed cycle at the nodes of all interfaces.
 
-    It is a :class:`wear.contact.nodes.NodalCycle`.
-
-    ``stiffness`` [MPa/mm] is the most that the pressure of a node answers to its gap.
+    It is a :class:`wear.contact.nodes.NodalCycle`. ``stiffness`` [MPa/mm] bounds the change of
+    nodal pressure per change of gap.
     """
 
     histories: Sequence[InterfaceHistory]
@@ -55,25 +54,25 @@ class StructureCycle:
 
     @cached_property
     def slip(self) -> Array:
-        """Half of that before and half of that after each solved state ``(t, n)`` [mm]."""
+        """Half of the slip before and half of that after each solved state ``(t, n)`` [mm]."""
         return np.concatenate([acting_slip(h.slip, h.loads) for h in self.histories], axis=1)
 
     @cached_property
     def pressure(self) -> Array:
-        """At the end of each increment ``(t, n)`` [MPa]."""
+        """Pressure at the end of each increment ``(t, n)`` [MPa]."""
         force = np.concatenate([h.force[:, 2] for h in self.histories], axis=1)
         return np.divide(force, self.areas, out=np.zeros_like(force), where=self.areas > 0.0)
 
     def stable_cycles(self, depth_per_pressure: Array) -> float:
-        """2 / (k w): k bounds the stiffness of the nodes that touch, w is the largest wear."""
+        """Return the stable step 2 / (k w): k bounds the stiffness, w is the largest wear."""
         fastest = self.stiffness * float(depth_per_pressure.max())
         return 2.0 / fastest if fastest > 0.0 else np.inf
 
 
 class NodalFace(FaceContact):
-    """One face whose nodes wear. The surfaces of its states are nodal, ``(n,)``.
+    """One contact face that wears at its nodes, with surfaces of shape ``(n,)`` in its states.
 
-    ``start`` of a state is the depth of the nodes of all faces, by which their cycle is found.
+    ``start`` of a state is the worn depth at the nodes of all faces; it identifies their cycle.
     """
 
     def __init__(
@@ -83,7 +82,7 @@ class NodalFace(FaceContact):
         self._cycles, self._number = cycles, number
 
     def history(self, state: InterfaceState) -> InterfaceHistory:
-        """What the face does in a cycle on the surfaces of a state."""
+        """Return the cycle of the face on the surfaces of a state."""
         assert isinstance(state.start, np.ndarray)
         return self._cycles.on_faces(self._cycles.at(state.start))[self._number]
 
@@ -124,7 +123,7 @@ class NodalFace(FaceContact):
 
 
 class _Cycles:
-    """The structure's cycles on worn surfaces, each a function of these alone."""
+    """Cycles of the structure on worn surfaces, each determined by the worn depth alone."""
 
     def __init__(self, source: StructureLoads, faces: Sequence[ContactFace]) -> None:
         self._source, self.on_faces = source, source.on_faces
@@ -132,11 +131,11 @@ class _Cycles:
         self._solved: deque[tuple[Array, CycleSolution]] = deque(maxlen=KEPT)
 
     def split(self, nodal: Array) -> list[Array]:
-        """By interface, fields ``(..., n)`` of all nodes."""
+        """Return nodal fields ``(..., n)`` split by interface."""
         return np.split(nodal, self._ends, axis=-1)
 
     def at(self, depth: Array) -> CycleSolution:
-        """That of surfaces which have lost a ``depth`` ``(n,)`` [mm], both bodies together."""
+        """Return the cycle on surfaces with the worn ``depth`` ``(n,)`` of both bodies [mm]."""
         if not depth.any():
             return self._source.unworn_cycle
         for known, solution in self._solved:
@@ -147,12 +146,12 @@ class _Cycles:
         return solution
 
     def near(self, depth: Array, other: CycleSolution) -> CycleSolution:
-        """The same where surfaces differ little from those of ``other``: sooner solved."""
+        """Return the cycle of :meth:`at`, started from ``other`` on similar surfaces: faster."""
         return self._source.worn_cycle(self.split(depth), after=other)
 
 
 class NodalContacts(FaceContacts):
-    """The faces of a structure that wear at their nodes, all of them together."""
+    """All faces of a structure, which wear at their nodes and advance together."""
 
     def __init__(
         self,
@@ -206,7 +205,7 @@ class NodalContacts(FaceContacts):
         lost = _fields(result.state.surfaces) - _fields(state.surfaces)
         after = self._cycles.at(result.state.surfaces.depth)
         worn = self._of_interfaces(result.state, lost / cycles, after)
-        # All faces wear together: what that has taken counts once.
+        # All faces wear together, so the cost counts once.
         return [(face, Spent() if number else spent) for number, face in enumerate(worn)]
 
     def restored(self, state: CoupledState) -> CoupledState:
@@ -217,9 +216,9 @@ class NodalContacts(FaceContacts):
         cycle = StructureCycle(histories, self._friction, self._areas, self._stiffness)
         return NodalContact(self._laws, (cycle,))
 
-    # -- states of all nodes, and by interface -----------------------------------------------------
+    # -- states of all nodes and of single interfaces ----------------------------------------------
     def _together(self, states: Sequence[InterfaceState]) -> NodalState:
-        """The state of all nodes; its companion too, where every face has one."""
+        """Return the state of all nodes, with its coarse companion if every face has one."""
         fields = np.concatenate([_fields(state.surfaces) for state in states], axis=-1)
         companions = [state.coarse for state in states if state.coarse is not None]
         first = states[0]
@@ -236,9 +235,10 @@ class NodalContacts(FaceContacts):
     def _of_interfaces(
         self, state: NodalState, rates: Array, solution: CycleSolution
     ) -> tuple[InterfaceState, ...]:
-        """The states of the faces, which lose so much in a cycle ``(3, n)``.
+        """Return the states of the faces; ``rates`` ``(3, n)`` are their losses per cycle.
 
-        ``solution`` is their cycle, and stands for the companion's, whose loads nobody asks for.
+        ``solution`` is their cycle. The companion gets the same cycle, because its loads are not
+        used.
         """
         split, depth = self._cycles.split, state.surfaces.depth
         coarse: Sequence[InterfaceState | None] = [None] * len(self.stages)
@@ -270,7 +270,7 @@ class NodalContacts(FaceContacts):
         return tuple(faces)
 
     def _found(self, states: Sequence[InterfaceState]) -> tuple[InterfaceState, ...]:
-        """States with the depth of all nodes, by which their cycle is found."""
+        """Return the states with the worn depth of all nodes, which identifies their cycle."""
         depth = np.concatenate([state.surfaces.depth for state in states])
         companions = [state.coarse for state in states if isinstance(state.coarse, InterfaceState)]
         coarse: Sequence[InterfaceState | None] = [None] * len(states)
@@ -299,12 +299,12 @@ class NodalContacts(FaceContacts):
 
 
 def _fields(surfaces: Surfaces) -> Array:
-    """Depths of both bodies and energy per area ``(3, n)``, which is one for both."""
+    """Return the depths of both bodies and the energy per area, common to both ``(3, n)``."""
     return np.stack([surfaces.depth_1, surfaces.depth_2, surfaces.work_2])
 
 
 def _on_cells(stage: FaceContact, history: InterfaceHistory) -> CycleTractions:
-    """A cycle of a face on the cells of its grid."""
+    """Return the cycle of a face on the cells of its grid."""
     areas, force = history.interface.nodal_areas, history.force
     traction = np.divide(force, areas, out=np.zeros_like(force), where=areas > 0.0)
     on_cells, slip = map(stage.transfer.to_cells, (traction, history.slip))

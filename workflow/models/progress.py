@@ -1,4 +1,4 @@
-"""Progress of long computations, reported to whoever asks for it."""
+"""Progress of long computations, reported to a callable."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class ReportsProgress:
 
     @contextmanager
     def reporting_to(self, progress: Progress) -> Iterator[None]:
-        """Call ``progress`` with the steps done and the steps in all, within this context."""
+        """Call ``progress`` with the steps done and the total number, within this context."""
         self._progress = progress
         try:
             yield

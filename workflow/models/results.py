@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Declared(NamedTuple):
-    """What a variable of the results is: its unit, its description and its dimensions."""
+    """Unit, description and dimensions of a variable of the results."""
 
     unit: str
     description: str
@@ -68,7 +68,7 @@ FORCES = {"N", "N mm", "mm^3"}
 
 @dataclass
 class Recorder(Observer):
-    """Records surfaces and tractions after every jump; those at the increment ``peak``."""
+    """Recorder of surfaces, and of tractions at the increment ``peak``, after every jump."""
 
     contacts: FaceContacts
     peak: int
@@ -91,7 +91,7 @@ class Recorder(Observer):
 
 @dataclass(frozen=True)
 class WearResults:
-    """Results of a run, from what was recorded and its ``state`` at the end.
+    """Results of a run, from its recorder and its ``state`` at the end.
 
     The tree has a group for each contact face, by its name: fields over ``x`` and ``y`` of the face
     after every jump (``cycles``), depths, volumes and energy, and the resultants of the closed
@@ -154,7 +154,7 @@ class WearResults:
         return xr.Dataset(variables, coords=coordinates)
 
     def _recorded(self, of_all_jumps: Array) -> Array:
-        """Return the rows of the jumps that were recorded: of a run that went on, the last ones."""
+        """Return the rows of the jumps that were recorded; for a resumed run, the last ones."""
         return of_all_jumps[-len(self.recorder.cycles) :]
 
     def _cycles(self) -> xr.Variable:

@@ -56,7 +56,7 @@ class LoadCycle:
 
 @dataclass(frozen=True)
 class Nonlinearity:
-    """Which geometric nonlinearity of a structure is taken into account.
+    """Geometric nonlinearity of a structure that is taken into account.
 
     Parameters
     ----------
@@ -143,12 +143,12 @@ class StructureModel(Protocol):
         ...
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterable[Remark]:
-        """Return what a user should know of this structure under this friction."""
+        """Return remarks on this structure and friction for the user."""
         ...
 
 
 class StructureStore(Protocol):
-    """Where condensed structures and their unworn cycles are stored between runs."""
+    """Storage of condensed structures and their unworn cycles between runs."""
 
     def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
         """Return the condensed body made from these arrays; ``make`` it if it is not stored."""
@@ -172,7 +172,7 @@ class StructureStore(Protocol):
 
 
 class NoStore:
-    """A store that keeps nothing: everything is computed anew."""
+    """A store without contents: everything is computed anew."""
 
     def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
         return make()
@@ -193,15 +193,15 @@ class NoStore:
 
 
 class StructureLoads(ReportsProgress):
-    """Loads of the contacts of a structure, and its stresses and worn mesh.
+    """Loads of the contacts of a structure, with its stresses and worn mesh.
 
     It is a :class:`workflow.models.loads.LoadSource`. Condensed bodies, joints and unworn cycles
-    come from the ``store`` where they are there. ``friction`` gives the coefficient of an interface
-    before any wear, by its name; methods take one per interface after wear.
+    are taken from the ``store`` if they are there. ``friction`` returns the coefficient of an
+    unworn interface by its name; methods take one coefficient per interface after wear.
 
-    Worn depths are nodal, ``(n,)`` per contact face, of both bodies together [mm]. Of a face that
-    planes of symmetry cut, the contact is that of the whole face, whose first nodes are the meshed
-    ones; cycles, stress and worn meshes are those of the meshed part.
+    Worn depths are nodal, ``(n,)`` per contact face, the sum of both bodies [mm]. Where planes of
+    symmetry cut a face, the contact is the whole face, and its first nodes are the meshed ones;
+    cycles, stresses and worn meshes describe the meshed part.
     """
 
     slip_known = True
@@ -231,7 +231,7 @@ class StructureLoads(ReportsProgress):
         return tuple(self._friction(interface.name) for interface in self.mesh.interfaces)
 
     def remarks(self) -> Iterable[Remark]:
-        """Return what a user should know of the structure."""
+        """Return remarks on the structure for the user."""
         return self.model.remarks(self.structure, self.friction)
 
     @property
@@ -244,14 +244,14 @@ class StructureLoads(ReportsProgress):
 
     @cached_property
     def joint(self) -> FrictionalJoint:
-        """The condensed joint before any wear, from the cache when it is there."""
+        """The condensed joint before any wear, from the cache if it is there."""
         return FrictionalJoint(self._resolvent, self._nodal_friction())
 
     @cached_property
     def _resolvent(self) -> JointResolvent:
-        """The condensed joint, as stiff as the case asks for."""
+        """The condensed joint with the stiffness that the case asks for."""
         resolvent = self._linear_resolvent
-        # The linear structure itself takes seconds to build, and is not asked for.
+        # Only a nonlinear stiffness needs the structure itself, which takes seconds to build.
         if self.model.nonlinearity.stiffness != "linear":
             assert isinstance(self.structure, PrestressedStructure)
             resolvent = self.structure.condense_path(resolvent)
@@ -259,7 +259,7 @@ class StructureLoads(ReportsProgress):
 
     @property
     def rigid_modes(self) -> int:
-        """Rigid motions that contact alone holds."""
+        """Number of rigid motions that contact alone prevents."""
         return self._linear_resolvent.rigid_modes
 
     @cached_property
@@ -277,11 +277,11 @@ class StructureLoads(ReportsProgress):
 
     @cached_property
     def structure(self) -> Structure:
-        """All bodies with supports and loads, unworn, as stiff as the case asks for."""
+        """All unworn bodies with supports and loads, with the stiffness that the case asks for."""
         return self._prestressed(self._linear)
 
     def _prestressed(self, structure: Structure) -> Structure:
-        """The structure with the stiffness that the case asks for."""
+        """Return the structure with the stiffness that the case asks for."""
         kind = self.model.nonlinearity.stiffness
         if kind == "linear":
             return structure
@@ -300,7 +300,7 @@ class StructureLoads(ReportsProgress):
 
     @cached_property
     def nonlinear_check(self) -> NonlinearCheck:
-        """The linear structure at peak load beside the total Lagrangian one."""
+        """Comparison of the linear structure with the total Lagrangian one at peak load."""
         linear = self._linear
         check = check_nonlinearity(
             linear,
@@ -318,15 +318,15 @@ class StructureLoads(ReportsProgress):
         return check
 
     def node_count(self) -> int:
-        """Nodes of all bodies, midsides included."""
+        """Return the number of nodes of all bodies, midside nodes included."""
         return self.mesh.node_count(self.model.order)
 
     def interface_count(self) -> int:
-        """Nodes of all interfaces."""
+        """Return the number of nodes of all interfaces."""
         return sum(len(interface) for interface in self.mesh.interfaces)
 
     def prepare(self) -> None:
-        """Do the costly part now: condense the structure, or find it in the cache."""
+        """Condense the structure now, which is costly, or find it in the cache."""
         _ = self.joint
 
     @cached_property
@@ -335,7 +335,7 @@ class StructureLoads(ReportsProgress):
         return self._mixed(self._unworn_missions)
 
     def cycle_under(self, missions: Sequence[LoadCycle]) -> CycleSolution:
-        """Return the unworn cycle under other loads, whose cases are those of the model."""
+        """Return the unworn cycle under other missions, which use the load cases of the model."""
         cycles = [self._unworn_mission(self._tight(mission)) for mission in missions]
         return mixed(cycles, [mission.share for mission in missions])
 
@@ -345,17 +345,17 @@ class StructureLoads(ReportsProgress):
 
     @cached_property
     def load_cycles(self) -> tuple[LoadCycle, ...]:
-        """Closed cycles of the loads, with bolts as short as they were tightened."""
+        """Closed cycles of the loads, with the bolts at their tightened shortening."""
         return tuple(map(self._tight, self.model.load_cycles))
 
     @cached_property
     def bolts(self) -> tuple[Bolt, ...]:
-        """The bolts, none in a structure of which the loads tighten none."""
+        """The bolts of the structure; empty if the loads tighten none."""
         return self.model.bolts(self._linear) if self.model.tightening else ()
 
     @cached_property
     def shortenings(self) -> Array:
-        """Of the ``bolts`` at amplitudes of 1, over those of their load cases ``(bolts,)``."""
+        """Shortening of each tightened bolt relative to that of its load case ``(bolts,)``."""
         found = np.ones(len(self.bolts))
         asked = [k for k, bolt in enumerate(self.bolts) if bolt.force is not None]
         if asked:
@@ -369,7 +369,7 @@ class StructureLoads(ReportsProgress):
         return found
 
     def _tight(self, mission: LoadCycle) -> LoadCycle:
-        """The mission with the bolts as short as they are when tight."""
+        """Return the mission with the bolts at their tightened shortening."""
         if not self.bolts:
             return mission
         factors = np.ones(mission.amplitudes.shape[1])
@@ -378,7 +378,7 @@ class StructureLoads(ReportsProgress):
         return replace(mission, amplitudes=amplitudes, preload=preload)
 
     def tensions(self, loads: Sequence[LoadHistory]) -> Array:
-        """Of all bolts ``(bolts, t)`` [N], under the loads of all whole contacts."""
+        """Return bolt tensions ``(bolts, t)`` [N] under the loads of all whole contacts."""
         if not self.bolts:
             return np.empty((0, len(self._amplitudes)))
         sides = [2.0 ** len(interface.planes) for interface in self.mesh.interfaces]
@@ -386,7 +386,7 @@ class StructureLoads(ReportsProgress):
         return np.array([b.section.tension(resultants, self._amplitudes) for b in self.bolts])
 
     def _unworn_mission(self, mission: LoadCycle) -> CycleSolution:
-        """The closed cycle of one mission from rest, from the cache if it is there."""
+        """Return the closed cycle of one mission from rest, from the cache if it is there."""
         friction = self._nodal_friction()
         loads = [path.tolist() for path in (mission.preload, mission.amplitudes)]
         stiffness = self.model.nonlinearity.stiffness
@@ -404,7 +404,7 @@ class StructureLoads(ReportsProgress):
         return self.on_faces(self.unworn_cycle)
 
     def on_faces(self, cycle: CycleSolution) -> tuple[InterfaceHistory, ...]:
-        """What the contact faces do over a cycle, the whole of those that symmetry cuts."""
+        """Return the cycle of each contact face; a face that symmetry cuts is completed."""
         return tuple(map(whole_history, cycle.histories))
 
     def worn_cycle(
@@ -413,16 +413,16 @@ class StructureLoads(ReportsProgress):
         friction: Sequence[float] | None = None,
         after: CycleSolution | None = None,
     ) -> CycleSolution:
-        """The cycle that follows the unworn one when the gaps are wider by the worn depths.
+        """Return the cycle that follows the unworn one when worn depths widen the gaps.
 
-        Of a single mission it may follow one ``after`` which the gaps were less wide: found sooner.
+        A single mission may start from a cycle ``after`` less wear, which is faster.
         """
         missions, asked = self._unworn_missions, np.concatenate([*depths, friction or ()])
         if after is not None:
             (unworn,) = missions
             missions = (replace(after, cycles=unworn.cycles),)
         elif self._worn is not None and np.array_equal(asked, self._worn[0]):
-            # A run's end is asked for again where its loads have just followed it.
+            # The cycle at the end is requested again where the loads have just been updated.
             return self._worn[1]
         pairs = zip(self.load_cycles, missions, strict=True)
         cycles = [self._cycle(mission, depths, unworn, friction) for mission, unworn in pairs]
@@ -456,7 +456,7 @@ class StructureLoads(ReportsProgress):
         )
 
     def stiffest(self, areas: Array) -> float:
-        """Most that a change of gap raises pressures by, at nodes of such ``areas`` [MPa/mm]."""
+        """Return the largest rise of nodal pressure per change of gap, for ``areas`` [MPa/mm]."""
         scale = np.divide(1.0, np.sqrt(areas), out=np.zeros_like(areas), where=areas > 0.0)
         stiffness = self._resolvent.normal_stiffness(len(areas))
         last = len(areas) - 1
@@ -464,7 +464,7 @@ class StructureLoads(ReportsProgress):
         return float(largest)
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
-        """The nodes of the faces of a mesh of the user's own."""
+        """Return the nodes of the interface's faces that have numbers in the user's mesh."""
         interface = self.mesh.interfaces[number]
         return tuple(
             UserFace(body, numbers[interface.nodes(body)], interface.frame)
@@ -473,9 +473,9 @@ class StructureLoads(ReportsProgress):
         )
 
     def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
-        """Resultants ``(interfaces, 6)`` at peak load reached in a single increment.
+        """Return the resultants ``(interfaces, 6)`` at peak load, reached in a single increment.
 
-        Cheap, and moved by wear and friction as those of the full cycle are.
+        They are cheap, and wear and friction change them as they change those of the full cycle.
         """
         state = self._march_to_peak(depths, [self._unworn_peak.state], friction)
         pairs = zip(self.mesh.interfaces, self.structure.interface_resultants(state), strict=True)
@@ -497,7 +497,7 @@ class StructureLoads(ReportsProgress):
         return state
 
     def _nodal_friction(self, friction: Sequence[float] | None = None) -> float | Array:
-        """Coefficients of the interfaces at all nodes ``(n,)``; one if all have the model's."""
+        """Return the coefficients of friction at all nodes ``(n,)``, or the one that all share."""
         if friction is None:
             friction = self.friction
             if len(set(friction)) == 1:
@@ -526,10 +526,10 @@ class StructureLoads(ReportsProgress):
         shown: Sequence[int] = (),
         done: Callable[[], None] = lambda: None,
     ) -> dict[str, CycleStress]:
-        """Stress of all bodies on unworn or worn meshes: at peak load, and in those ``shown``.
+        """Return the stress of all bodies by state: at peak load and in the increments ``shown``.
 
-        Of the increments that are shown it is that of the surface. For ``done`` see
-        :func:`fe_models.elasticity.stress.cycle_stress`.
+        Each state has its unworn or worn mesh. In the increments ``shown``, stress is that of the
+        surface. For ``done`` see :func:`fe_models.elasticity.stress.cycle_stress`.
         """
         jobs = [
             partial(self._stress, self._on(mesh), of, shown, done) for mesh, of in states.values()
@@ -537,20 +537,20 @@ class StructureLoads(ReportsProgress):
         return dict(zip(states, self.structure.at_once(*jobs), strict=True))
 
     def worn_mesh(self, depths: list[tuple[Array, Array]]) -> StructureMesh:
-        """The mesh with faces that have lost nodal ``depths`` ``(n,)`` of body 1 and 2 [mm].
+        """Return the mesh whose faces have lost nodal ``depths`` ``(n,)`` of body 1 and 2 [mm].
 
-        The structure on it is built and assembled, for :meth:`stresses`. Raises as
+        The structure on this mesh is built and assembled for :meth:`stresses`. Raises as
         :func:`fe_models.meshes.remesh.worn_mesh`.
         """
         mesh = worn_mesh(self.mesh, depths)
         structure = self._on(mesh)
-        # Its stiffness tells, and is kept.
+        # Asking what is held assembles the stiffness, which the bodies store.
         _ = [body.is_held for body in structure.bodies]
         self._on_worn = mesh, structure
         return mesh
 
     def _on(self, mesh: StructureMesh) -> Structure:
-        """The structure on the unworn or the worn mesh."""
+        """Return the structure on the unworn or the worn mesh."""
         if mesh is self.mesh:
             return self.structure
         if self._on_worn is not None and mesh is self._on_worn[0]:
@@ -575,7 +575,7 @@ class StructureLoads(ReportsProgress):
 
 
 def _converged(solved: Solved) -> Solved:
-    """What was solved. Raises MethodFailed unless it has converged."""
+    """Return a solution that has converged. Raises MethodFailed otherwise."""
     if not solved.converged:
         raise MethodFailed(
             f"structural friction did not converge: residual {solved.residual:.1e} after "

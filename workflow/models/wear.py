@@ -28,11 +28,11 @@ class WearModel:
     Parameters
     ----------
     structure : StructureModel or LoadSource
-        What loads the contacts: a structure of finite elements, or any source of loads.
+        Source of the loads: a structure of finite elements, or any other.
     contacts : Contact or mapping of str to Contact
-        What the contacts are made of: one for all, or one for each face by its name.
+        One contact for all faces, or one for each face by its name.
     wear : Wear
-        How far they wear, and in which steps.
+        Length and steps of the wear.
 
     Examples
     --------
@@ -63,7 +63,7 @@ class WearModel:
         return self.contacts[name]
 
     def loads(self, store: StructureStore | None = None) -> LoadSource:
-        """Return the loads of the contacts; a structure is condensed, or found in the ``store``."""
+        """Return the loads of the contacts; a structure is condensed, or found in ``store``."""
         if hasattr(self.structure, "meshed"):
             structure = cast("StructureModel", self.structure)
             return StructureLoads(structure, self._unworn_friction, store)
@@ -93,7 +93,7 @@ class WearModel:
         return CoupledWear(self.settings(loads), loads, contacts, observers)
 
     def settings(self, loads: LoadSource) -> CoupledSettings:
-        """Return how far the coupled loop goes, and when loads are computed again."""
+        """Return the length of the coupled loop, and when it updates the loads."""
         names = (face.face.name for face in loads.faces)
         evolves = any(self.contact(name).coulomb.evolution is not None for name in names)
         return self.wear.coupled("evolving" if evolves else "constant")
@@ -111,10 +111,10 @@ class WearModel:
         observers : sequence of Observer
             Called while the run goes on, such as :class:`fretscale.Progress`.
         start : CoupledState, optional
-            State of an earlier run of the same model to go on from, such as that of a
+            State of an earlier run of the same model to resume from, such as that of a
             :class:`fretscale.Checkpoint`.
         store : StructureStore, optional
-            Where condensed structures are kept between runs.
+            Storage of condensed structures between runs.
 
         Returns
         -------
@@ -144,7 +144,7 @@ class WearModel:
 
 
 def check_start(start: CoupledState, unworn: CoupledState) -> None:
-    """Raise InputError unless a state to go on from can be of the model of an ``unworn`` one.
+    """Raise InputError unless the state to start from fits the model of an ``unworn`` one.
 
     Faces and their gaps must be the same, and the loads too where wear has not changed them yet.
     """

@@ -1,4 +1,4 @@
-"""Wear of contacts: structure, contact, wear, and back to the structure."""
+"""Wear analysis of contacts: structure, contact, wear, and loads of the worn structure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["ANALYSIS"]
 
 
 def _run(run: Run[WearCase]) -> None:
-    # Solvers take a second to load: where they are used.
+    # Solvers take a second to import, so they are imported only where they are used.
     from workflow.analyses.wear.run import run_wear
 
     run_wear(run)
@@ -35,7 +35,7 @@ def _draw_faces(case: WearCase, name: str, out: Path, force: bool) -> Path:
 
 
 def _pictures() -> Pictures:
-    # Plots take a second to load: where they are drawn.
+    # Plots take a second to import, so they are imported only where they are drawn.
     from workflow.analyses.wear.figures.wear import figures_of
     from workflow.analyses.wear.layout import Contents
     from workflow.analyses.wear.paraview.wear import write_wear

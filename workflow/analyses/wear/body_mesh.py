@@ -1,4 +1,4 @@
-"""A body of ``results.h5`` as a mesh of VTK's."""
+"""Conversion of a body in ``results.h5`` to a VTK mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def body_mesh(group: h5py.Group) -> pyvista.UnstructuredGrid:
-    """Its tetrahedra or, in the plane, its triangles, without fields."""
+    """Return the body's tetrahedra or, in the plane, its triangles, without fields."""
     import pyvista
 
     elements = group["elements"][()]

@@ -1,10 +1,10 @@
 """Stress of one body under its contact: a section at peak load, a history at a depth.
 
-Tractions on the fine grid stress a half-space; a structure adds what it carries past the contact.
-On the face and just below that is told by the motion of its nodes
-(:mod:`wear.cracking.bulk_stress`), from one element's depth on by the stress of its mesh, less that
-of half-spaces under its nodal forces: there the stress is the mesh's, to which fine tractions
-differ from nodal forces by nothing much.
+Tractions on the fine grid load a half-space; a structure adds the stress that it carries past the
+contact. On the face and just below it, that part follows from the motion of the nodes
+(:mod:`wear.cracking.bulk_stress`). From the depth of one element on, it is the stress of the mesh
+minus that of half-spaces under the nodal forces: there the total is the stress of the mesh, because
+fine tractions and nodal forces have nearly the same effect.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from workflow.models.contact import FaceContact
 
 
 class Planes:
-    """Where the stress of a contact is looked at: the section's points and the depth of maps."""
+    """Places of computed stress: the points of the section and the depth of the maps."""
 
     def __init__(self, settings: ContactStress, grid: Grid) -> None:
         self.settings = settings
@@ -43,18 +43,18 @@ class Planes:
         self.depths: Array = first + (settings.depth - first) * share**2
 
     def sections(self, wanted: Sequence[tuple[SubsurfaceStress, Array, Array]]) -> list[Array]:
-        """Stress ``(6, n, k)`` in the section of bodies under tractions at depths, each as wanted.
+        """Return stresses ``(6, n, k)`` in the section, per solver, tractions and depths.
 
         See :func:`sa_solver.half_space.subsurface.sections`.
         """
         return subsurface.sections(wanted, "y" if self._along else "x", self.at)
 
     def row(self, values: np.ndarray) -> np.ndarray:
-        """Those of the section ``(c, n, 1)`` of values at cells ``(c, nx, ny)``."""
+        """Return the section's values ``(c, n, 1)`` of those at all cells ``(c, nx, ny)``."""
         return np.expand_dims(np.take(values, self._row, axis=2 - self._along), -1)
 
     def points(self, heights: Array) -> Array:
-        """The section's points at such ``heights`` ``(k,)``, ``(n k, 3)`` in the frame [mm]."""
+        """Return the section's points at ``heights`` ``(k,)`` in the frame ``(n k, 3)`` [mm]."""
         along, z = (axis.ravel() for axis in np.meshgrid(self.along, heights, indexing="ij"))
         across = np.full_like(along, self.at)
         return np.stack([across, along, z] if self._along else [along, across, z], axis=1)
@@ -62,12 +62,12 @@ class Planes:
 
 @dataclass(frozen=True)
 class StressedCycle:
-    """What is known of one contact over a cycle.
+    """One contact over a cycle: tractions, loads, and the structure's solution near it.
 
-    ``tractions`` on its grid and the ``loads`` that they go with. Of a structure too the
-    displacements ``(t, 3, n)`` [mm] of the ``faces`` of both bodies in these, the ``fields`` of
-    stress in both at peak load, and where temperatures change the ``expansions`` ``(t, 2, n)`` of
-    the faces, with their slopes along z [1/mm].
+    ``tractions`` lie on the grid and belong to the ``loads``. With a structure there are also the
+    displacements ``(t, 3, n)`` [mm] of the ``faces`` of both bodies, the stress ``fields`` of both
+    at peak load and, where temperatures change, the ``expansions`` ``(t, 2, n)`` of the faces, with
+    their slopes along z [1/mm].
     """
 
     tractions: CycleTractions
@@ -77,12 +77,12 @@ class StressedCycle:
     expansions: tuple[Array, Array] | None = None
 
     def traction(self, t: int) -> Array:
-        """Tractions qx, qy, p of increment ``t`` ``(3, nx, ny)`` [MPa]."""
+        """Return the tractions qx, qy, p of increment ``t`` ``(3, nx, ny)`` [MPa]."""
         return np.concatenate([self.tractions.shear[t], self.tractions.pressure[t, None]])
 
 
 def with_known_shear(stage: FaceContact, cycle: CycleTractions, loads: FaceLoads) -> CycleTractions:
-    """The tractions with shear where the contact sticks, if the nodes of the loads know it."""
+    """Return tractions with the shear of sticking areas, if the nodal loads provide it."""
     if loads.force is None or not cycle.unknown.any():
         return cycle
     nodal = stage.transfer.spread(loads.force)
@@ -95,19 +95,20 @@ class StressedBody:
     def __init__(self, stage: FaceContact, material: Material, number: Literal[1, 2]) -> None:
         self.material, self.number = material, number
         self._stage = stage
-        # Each keeps the symbols of a depth, or its own: one per body serves both moments.
+        # The solver caches the coefficients of one depth, so one solver serves unworn and worn
+        # states.
         self._solver = SubsurfaceStress(stage.grid, material, number)
         self._face = BodyFace(stage.grid, stage.transfer, material, number)
-        # Where bodies overhang, the contact's face goes on to the end of an element.
+        # Where bodies overhang, the contact face extends to the end of an element.
         self._on_face = stage.transfer.inside & stage.transfer_of(number).inside
 
     @property
     def convolutions(self) -> int:
-        """Done so far."""
+        """Number of convolutions so far."""
         return self._solver.count + self._face.half_space.count
 
     def bulk(self, cycle: StressedCycle) -> BulkStress | None:
-        """What a structure carries past the contact; None without one that tells."""
+        """Return the stress that the structure carries past the contact, or None if unknown."""
         if cycle.faces is None or cycle.loads.force is None:
             return None
         moved = cycle.faces[self.number - 1]
@@ -117,9 +118,9 @@ class StressedBody:
     def history(
         self, cycle: StressedCycle, bulk: BulkStress | None, depth: float, known: Mask
     ) -> Array:
-        """Stress ``(t, 6, nx, ny)`` at ``depth``; 0 in increments that are not ``known`` ``(t,)``.
+        """Return stress ``(t, 6, nx, ny)`` at ``depth``; 0 in increments not ``known`` ``(t,)``.
 
-        It is 0 outside the body, too. Without a structure it is that of the contact alone.
+        It is 0 outside the body. Without a structure it is the stress due to the contact alone.
         """
         stress = np.zeros((len(known), 6, *self._stage.grid.shape))
         if bulk is not None:
@@ -133,7 +134,7 @@ class StressedBody:
     def tension(
         self, cycle: StressedCycle, bulk: BulkStress | None, depth: float, known: Mask
     ) -> Array:
-        """The largest tension along the face ``(nx, ny)`` of that history [MPa], 0 without any."""
+        """Return the largest tension along the face in that history ``(nx, ny)`` [MPa], or 0."""
         tension = np.zeros(self._stage.grid.shape)
         carried = np.zeros((len(known), 3, *tension.shape))
         if bulk is not None:
@@ -148,12 +149,12 @@ class StressedBody:
         return tension
 
     def _acting(self, cycle: StressedCycle, known: Mask) -> list[int]:
-        """The increments that are ``known`` in which tractions act."""
+        """Return the ``known`` increments in which tractions act."""
         pressed = cycle.tractions.pressure.any(axis=(1, 2))
         return np.flatnonzero(known & pressed).tolist()
 
     def _below(self, cycle: StressedCycle, depth: float) -> Mask:
-        """Which cells ``(nx, ny)`` have the body below them at such a depth."""
+        """Return the mask of cells ``(nx, ny)`` with the body below them at ``depth``."""
         grid = self._stage.grid
         x, y = grid.centres.reshape(2, -1)
         places = np.stack([x, y, np.full_like(x, SIDE[self.number] * depth)], axis=1)
@@ -161,10 +162,10 @@ class StressedBody:
         return there.reshape(grid.shape)
 
     def _there(self, cycle: StressedCycle, points: Array, on_face: Mask) -> Mask:
-        """Which ``points`` ``(n, 3)`` are in the body: below its contact face, or in its mesh.
+        """Return the mask of ``points`` ``(n, 3)`` below the contact face or inside the mesh.
 
-        A face need not be flat: what is ``on_face`` ``(n,)`` is in the body at any small depth.
-        Without a mesh nothing is known of what lies beyond.
+        A face need not be flat: points ``on_face`` ``(n,)`` are taken as inside the body at any
+        small depth. Without a mesh all points count as inside.
         """
         there = np.ones_like(on_face)
         if cycle.fields is not None and not on_face.all():
@@ -176,13 +177,13 @@ class StressedBody:
     def section(
         self, cycle: StressedCycle, bulk: BulkStress | None, planes: Planes, peak: int
     ) -> Array:
-        """Stress ``(6, n, k)`` in the section at peak load, as of :func:`sections`."""
+        """Return stress ``(6, n, k)`` in the section at peak load, as :func:`sections` does."""
         return sections([(self, cycle, bulk)], planes, peak)[0]
 
     def section_parts(
         self, cycle: StressedCycle, bulk: BulkStress | None, planes: Planes, peak: int
     ) -> tuple[list[tuple[SubsurfaceStress, Array, Array]], Callable[[list[Array]], Array]]:
-        """What :func:`sections` wants of half-spaces, and what makes the body's stress of that."""
+        """Return the half-space problems for :func:`sections`, and how to combine the solutions."""
         fine, solver = cycle.traction(peak), self._solver
         if bulk is None or cycle.fields is None or cycle.loads.force is None:
             return [(solver, fine, planes.depths)], lambda contact: contact[0]
@@ -197,7 +198,7 @@ class StressedBody:
         def joined(contact: list[Array]) -> Array:
             of_nodal, shallow, deep = contact
             mesh = field.at(places(heights), face.frame).reshape(6, -1, len(heights))
-            # Where the mesh ends above that depth, nothing but the face tells.
+            # Where the mesh ends above that depth, only the face provides the stress.
             bend = np.nan_to_num(mesh[..., :1] - of_nodal - surface[..., :1])
             shallow = shallow + surface[..., 1:] + bend * (near / whole) ** 2
             on_face = np.repeat(planes.row(self._on_face[None])[0], len(near), axis=1)
@@ -210,16 +211,16 @@ class StressedBody:
 
 
 Stressed = tuple[StressedBody, StressedCycle, BulkStress | None]
-"""A body, what is known of the contact over a cycle, and what the structure carries past it."""
+"""A body, the data of its contact over a cycle, and the stress carried past the contact."""
 
 
 def sections(stressed: Sequence[Stressed], planes: Planes, peak: int) -> list[Array]:
-    """Stress ``(6, n, k)`` of each in the section at peak load; not a number outside the body.
+    """Return stress ``(6, n, k)`` of each body in the section at peak load; nan outside the body.
 
-    Without a structure it is that of the contact alone. From one element's depth h on it is that of
-    the mesh, and that of half-spaces under what fine tractions have beside nodal forces. Above,
-    what is not the contact's own is as on the face, with its slope there and the value that it has
-    at h. What coefficients of influence these have in common they share.
+    Without a structure it is the stress due to the contact alone. From the depth h of one element
+    on, it is the stress of the mesh plus that of half-spaces under the difference of fine tractions
+    and nodal forces. Above h, the part that is not due to the contact has the value and slope of
+    the face at the surface and meets its value at h. Common influence coefficients are shared.
     """
     parts = [body.section_parts(cycle, bulk, planes, peak) for body, cycle, bulk in stressed]
     found = iter(planes.sections([part for tractions, _ in parts for part in tractions]))

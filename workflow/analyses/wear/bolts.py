@@ -1,4 +1,4 @@
-"""Bolts of a wear run: their tension over a cycle, and what of it is left as the contacts wear."""
+"""Bolts of a wear run: their tension over a cycle, and its loss as the contacts wear."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from workflow.shell.folder import OutputFolder
 from workflow.shell.results import Along, ResultsWriter
 from workflow.shell.store import read_arrays
 
-# Groups of the results, and what a jump keeps.
+# Group of the results, and dataset in the file of a jump.
 BOLTS, TENSION = "bolts", "bolts/tension"
 
 
 def kept_tensions(source: LoadSource, state: CoupledState) -> dict[str, Array]:
-    """Tensions ``(bolts, t)`` of a state, as its loads were last solved: what its jump keeps."""
+    """Return the tensions ``(bolts, t)`` of a state under its last solved loads, by dataset."""
     if not isinstance(source, StructureLoads) or not source.bolts:
         return {}
     return {TENSION: source.tensions([interface.loads for interface in state.interfaces])}
 
 
 class BoltTensions:
-    """Tensions ``(bolts, t)`` [N] of the ``stage``'s bolts over its unworn and its worn cycle."""
+    """Tensions ``(bolts, t)`` [N] of the bolts of ``stage`` over its unworn and its worn cycle."""
 
     def __init__(self, stage: StructureLoads, worn: Sequence[FaceLoads]) -> None:
         self._stage = stage
@@ -44,15 +44,16 @@ class BoltTensions:
         return tuple(bolt.name for bolt in self._stage.bolts)
 
     def write(self, writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None:
-        """Over both cycles, and at peak load after every jump as the loads were last solved.
+        """Write tensions over both cycles, and at peak load after every jump.
 
-        After the last one as the worn cycle has it.
+        Tensions after a jump are those of the last solved loads; the last one is that of the worn
+        cycle.
         """
         if not self.names:
             return
         peak = self._stage.peak
         kept = [read_arrays(folder.jump(jump))[0][TENSION] for jump in range(jumps)]
-        kept.append(self.moments["worn"])  # solved on the last surfaces, whatever the coupling
+        kept.append(self.moments["worn"])  # on the last surfaces, whatever the coupling
         for number, name in enumerate(self.names):
             over = "tension of the bolt in each increment, as far as it is meshed"
             cycles = {
@@ -68,7 +69,7 @@ class BoltTensions:
             writer.put(f"{BOLTS}/{name}", {"tension": left}, Along("kinetics/cycles"))
 
     def summary(self) -> dict[str, Any]:
-        """Of each bolt, by name; nothing without bolts."""
+        """Return the tensions of each bolt by name; empty without bolts."""
         if not self.names:
             return {}
         bolts = {}
@@ -81,7 +82,7 @@ class BoltTensions:
         return {BOLTS: bolts}
 
     def sentences(self) -> Iterator[str]:
-        """What each bolt has at peak load, unworn and worn."""
+        """Yield a sentence on each bolt's tension at peak load, unworn and worn."""
         per = "/mm" if self._stage.line else ""
         for name, numbers in self.summary().get(BOLTS, {}).items():
             before, after = (numbers["tension"][m]["peak"] for m in ("unworn", "worn"))

@@ -1,4 +1,4 @@
-"""The state that a wear run has between two jumps, as its checkpoint has it."""
+"""Storage of a wear run's state between two jumps in its checkpoint."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from workflow.errors import UserError
 from workflow.shell.analysis import Run
 from workflow.shell.checkpoint import StoredState, save
 
-# What the state has of all jumps.
+# Arrays over all jumps.
 HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
-# What the state of one interface has: parts of arrays, arrays, numbers.
+# Contents of one interface's state: groups of arrays, arrays, numbers.
 PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory, "link": Link}
 ARRAYS = ("slip", "pressed", "paths")
-# Where it has what solves start from: the increments, and of all of them these fields.
+# Start values of normal contact solves: their increments, and these fields of each.
 INCREMENTS, START = "starts/increments", ("pressure", "displacement")
-# Where it has what the half-space's own cycle starts from.
+# Start values of the half-space's frictional cycle.
 CYCLE = "cycle_start"
-# Where it has its companion.
+# Group of the coarse companion.
 COARSE = "coarse"
 SCALARS = ("energy", "depth_rate", "volume_rate", "next_cycles", "order")
 
 
 def keep(run: Run[Any], state: CoupledState, jumps: Sequence[str]) -> None:
-    """Write the state after jumps whose files have these digests."""
+    """Store the state, with the digests of the files of the jumps before it."""
     save(run.folder, StoredState(*stored_state(state), jumps), run.provenance)
 
 
 def stored_state(state: CoupledState) -> tuple[dict[str, object], dict[str, object]]:
-    """Return the arrays and the numbers by which a state is stored."""
+    """Return the arrays and the numbers that store a state."""
     arrays: dict[str, object] = {name: getattr(state, name) for name in HISTORIES}
     for number, interface in enumerate(state.interfaces):
         arrays |= _arrays_of(interface, f"interface_{number}")
@@ -53,7 +53,7 @@ def stored_state(state: CoupledState) -> tuple[dict[str, object], dict[str, obje
 
 
 def _arrays_of(interface: InterfaceState, group: str) -> dict[str, object]:
-    """The state of one interface and of its companion."""
+    """Return the arrays of one interface's state and of its coarse companion."""
     arrays: dict[str, object] = {
         f"{group}/{part}/{field.name}": getattr(getattr(interface, part), field.name)
         for part, kind in PARTS.items()
@@ -61,7 +61,7 @@ def _arrays_of(interface: InterfaceState, group: str) -> dict[str, object]:
     }
     arrays |= {f"{group}/{name}": getattr(interface, name) for name in ARRAYS}
     arrays[f"{group}/scalars"] = np.array([getattr(interface, name) for name in SCALARS])
-    # Each dataset takes as long as a field: those of all increments are one.
+    # The fields of all increments form one dataset, because each dataset has a fixed cost.
     if interface.starts:
         arrays[f"{group}/{INCREMENTS}"] = np.array(list(interface.starts))
         for name in START:
@@ -75,7 +75,7 @@ def _arrays_of(interface: InterfaceState, group: str) -> dict[str, object]:
 
 
 def restored(run: Run[Any], kept: StoredState) -> CoupledState:
-    """Return the state that a run goes on from.
+    """Return the state from which a run is resumed.
 
     Raises UserError for a state that another version stored.
     """

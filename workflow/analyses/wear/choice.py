@@ -1,4 +1,4 @@
-"""What is chosen for settings that a case leaves open, why, and how that is told."""
+"""Choices of settings that a case leaves open: decisions, their reasons and their report."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from workflow.shell.reporter import Reporter
 
 @dataclass(frozen=True)
 class Decision:
-    """What was chosen: ``value`` of the dotted ``entry``, ``why``, and the ``probe``'s numbers.
+    """Decision on one setting: the ``value`` of a dotted ``entry``, the reason, and probe results.
 
-    ``also`` are entries that go with it. ``allowed`` is the share of the accuracy that it may use
-    and ``error`` what it is estimated to use, both relative to depth and volume; None where there
-    is no estimate. ``met`` says whether the estimate is within the share.
+    ``also`` are entries that go with it. ``allowed`` is the part of the accuracy that the setting
+    may use and ``error`` the estimated part it uses, both relative to depth and volume; None
+    without an estimate. ``met`` says whether the estimate is within the allowed part.
     """
 
     entry: str
@@ -31,17 +31,17 @@ class Decision:
 
     @property
     def chosen(self) -> dict[str, Any]:
-        """Values of all entries."""
+        """Values of all entries of the decision."""
         return {self.entry: self.value, **self.also}
 
 
 def since(begin: float) -> float:
-    """Seconds since ``time.perf_counter()`` was ``begin``."""
+    """Return the seconds since ``time.perf_counter()`` returned ``begin``."""
     return round(time.perf_counter() - begin, 2)
 
 
 def record_of(decisions: Sequence[Decision], accuracy: float, seconds: float) -> dict[str, Any]:
-    """All that was decided so that ``accuracy`` is met, as JSON can say it."""
+    """Return the decisions that are to meet ``accuracy`` as data for JSON."""
     return {
         "accuracy": accuracy,
         "budget": {decision.entry: decision.allowed for decision in decisions},
@@ -58,9 +58,9 @@ def record_of(decisions: Sequence[Decision], accuracy: float, seconds: float) ->
 def report_choice(
     record: Mapping[str, Any] | None, reporter: Reporter, again: bool = False
 ) -> None:
-    """What was chosen and why, a line for each entry, and whether all of it is accurate enough.
+    """Report each choice with its reason, and whether the total error meets the accuracy.
 
-    That it is not is a warning, which a run that goes on has ``again``; the rest it has told.
+    A resumed run sets ``again``: it repeats only the warning that the accuracy is not met.
     """
     if record is None:
         return

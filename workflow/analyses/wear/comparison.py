@@ -1,4 +1,4 @@
-"""The cycle of the half-space beside the structure's, where the contact method is full."""
+"""Comparison of the cycle of the half-space with the structure's, where the method is full."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SHOWN = 0.0, 2.0 / 7.0, 0.5
 
 
 def half_space_loads(cycle: tuple[ContactState, ...], structure: LoadHistory) -> LoadHistory:
-    """Resultants and energies of a cycle of the half-space, mixed as those of the structure."""
+    """Return resultants and energies of the half-space's cycle, with the structure's mix."""
     P, Qx, Qy, Mx, My, Mz = np.stack([state.resultants for state in cycle], axis=1)
     Edx, Edy = np.stack([state.energy for state in cycle], axis=1)
     sliding = np.array([state.sliding for state in cycle])
@@ -31,11 +31,14 @@ def write_comparison(
     structure: LoadHistory,
     peak: int,
 ) -> None:
-    """Loads of the cycle, and its fields at the increments shown; of a mix, of the peak's cycle."""
+    """Write the loads of the cycle and its fields at the increments ``SHOWN``.
+
+    In a mix of missions, the fields are those of the mission with the peak load.
+    """
     group = f"comparison/{name}"
     writer.put(f"{group}/load_history", load_columns(half_space_loads(cycle, structure)))
     left = next(mission.stop for mission in structure.missions if peak < mission.stop) - 1 - peak
-    # A set: in a short cycle two of them may be the same.
+    # In a short cycle two of the increments may coincide, hence a set.
     for increment in sorted({peak + round(share * left) for share in SHOWN}):
         state = cycle[increment]
         fields = traction_fields(state.pressure, state.shear, state.slip)
@@ -45,7 +48,7 @@ def write_comparison(
 def comparison_summary(
     cycle: tuple[ContactState, ...], structure: LoadHistory, slip_known: bool
 ) -> dict[str, Any]:
-    """By increment, what follows in the half-space and what the structure says, if it does."""
+    """Return results of the half-space by increment, with the structure's where they are known."""
     half_space = half_space_loads(cycle, structure)
     forces, energies = ("Qx", "Qy", "Mz"), ("Edx", "Edy")
     told = {*forces, *(energies if slip_known else ())}

@@ -17,9 +17,9 @@ FIGURE = "contact_faces.png"
 
 
 def draw_faces(case: WearCase, name: str, out: Path, force: bool) -> Path:
-    """Draw where the contact faces of a case meet into a folder; returns the picture's path.
+    """Draw where the contact faces of a case meet into a folder, and return the picture's path.
 
-    ``name`` is that of the case in messages. Raises UserError where there is no mesh.
+    ``name`` is the name of the case in messages. Raises UserError where there is no mesh.
     """
     structure = structure_of(case)
     source = structure.source(case)

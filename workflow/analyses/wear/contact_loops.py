@@ -1,8 +1,8 @@
 """Tangential loops on the worn contacts of a wear run.
 
-A loop is run where it is due (unworn, after every wear step or only at the end), is kept with the
-fields of its jump, so that a resumed run still has it, and ends up in ``results.h5`` and, one row
-per loop, in ``loops_<interface>.csv`` (:mod:`workflow.analyses.wear.loop_table`).
+A loop is run for the unworn state and after every wear step, or only at the end. It is stored with
+the fields of its jump, so that a resumed run still has it. All loops are copied to ``results.h5``
+and, one row per loop, to ``loops_<interface>.csv`` (:mod:`workflow.analyses.wear.loop_table`).
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import ResultsWriter
 
-# Measured by every loop; cycles come from the jump.
+# Quantities that every loop measures; the cycles are those of the jump.
 MEASURED = tuple(column.name for column in COLUMNS if column.name != "cycles")
-# Interfaces and jumps are groups of a file.
+# Groups of a file above those of interfaces and jumps.
 LOOPS, LOOPS_OVER_ENERGY = "loops", "loops_over_energy"
 OVER_ENERGY = "energy", "kt", "kt_error", "mu", "mu_error"
 
 
 def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:
-    """Loops of the contacts ``names`` as arrays for the file of their jump."""
+    """Return the loops of the contacts ``names`` as arrays for the file of their jump."""
     arrays: dict[str, Array] = {}
     for name, loop in zip(names, loops, strict=True):
         place = f"{LOOPS}/{name}"
@@ -45,7 +45,7 @@ def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Arr
 def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int, per_length: bool) -> None:
     """Copy the loops of all jumps, 0 to ``jumps``, into the results: /loops/<interface>/<jump>.
 
-    What they measure is there against energy too: /loops_over_energy/<interface>.
+    The measured values are also written against energy: /loops_over_energy/<interface>.
     """
     measured: dict[str, list[list[float]]] = {}
     for jump in range(jumps + 1):
@@ -67,7 +67,7 @@ def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int, per_len
 
 
 def _unit(column: Column, per_length: bool) -> str:
-    """Of a dataset. Whoever writes it knows energies per mm, but not stiffnesses."""
+    """Return the unit for the results writer, which adds "per mm" to energies, not stiffnesses."""
     energy = column.name == "energy"
     return "N mm" if energy else column.units(per_length)[0]
 
@@ -83,7 +83,7 @@ def _write_loop(writer: ResultsWriter, place: str, kept: h5py.Group, cycles: flo
 
 
 def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[str, Any]]:
-    """Write the table of every interface; what the summary says of its loops, by interface."""
+    """Write the table of every interface; return the summary's loop entries by interface."""
     summary: dict[str, dict[str, Any]] = {}
     with h5py.File(folder.results, "r") as file:
         for name, group in file.get(LOOPS, {}).items():
@@ -96,7 +96,7 @@ def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[
 
 
 def warn_of_border(loops: dict[str, dict[str, Any]], asked: Loops, reporter: Reporter) -> None:
-    """Warn of loops under a normal force of their own that is too much for the grid."""
+    """Warn of loops whose own normal force presses the contact to the border of its grid."""
     for name, loop in loops.items():
         share = max(loop[when]["border_load"] for when in ("unworn", "worn"))
         if share > 0.0 and asked.normal_force is not None:
@@ -107,7 +107,7 @@ def warn_of_border(loops: dict[str, dict[str, Any]], asked: Loops, reporter: Rep
 
 
 def loops_sentence(name: str, loops: dict[str, Any], per_length: bool) -> str:
-    """The loops of an interface, as the summary has them, in a line."""
+    """Return a sentence on an interface's loops, from their summary."""
     first, last = loops["unworn"], loops["worn"]
     per = "/mm" if per_length else ""
     off = max(loop["kt_error"] / loop["kt"] for loop in (first, last))

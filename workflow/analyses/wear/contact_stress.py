@@ -1,9 +1,10 @@
 """Stress under the contacts, and where fretting cracks would start, on unworn and worn surfaces.
 
-Both follow from the tractions of the half-space, with each body as a separate half-space, and from
-what a structure of finite elements carries past the contact: without one that is not in them, and
-they say so. The surface itself is left out, since stress there hangs on the grid where shear starts
-at a slipping edge: sections begin, and maps lie, at the case's critical distance.
+The stress has two parts: that of separate half-spaces under the contact's tractions, and that which
+a structure of finite elements carries past the contact. Without such a structure the second part is
+missing, and the output says so. Stress on the surface itself is left out, because it depends on the
+grid where shear starts at a slipping edge: sections begin, and maps lie, at the critical distance
+of the case.
 """
 
 from __future__ import annotations
@@ -38,14 +39,14 @@ from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import On, ResultsWriter
 
-# Share of the load whose shear may be unknown. A hole in the shear makes stress of the order of µp
-# at its rim, whatever its size; the cells at the edge of a sliding contact that find no slipping
-# node of the structure stay below this.
+# Share of the load whose shear may be unknown. A gap in the shear causes stress of the order of µp
+# at its rim, whatever its size. The cells at the edge of a sliding contact that have no slipping
+# node of the structure nearby stay below this share.
 STUCK_SHARE = 0.01
 
 LEFT_OUT = "increments without full knowledge of the shear, not in the life map"
 
-# What the summary has of Ruiz's maps; of others the parameter's own.
+# Ruiz's maps that the summary reports; of other parameters it reports the parameter alone.
 RUIZ = ("cracking_parameter", "friction_parameter", "tension")
 
 
@@ -53,8 +54,9 @@ RUIZ = ("cracking_parameter", "friction_parameter", "tension")
 class BodyStress:
     """Stress of one body under one contact.
 
-    ``section`` ``(6, n, k)`` [MPa] at peak load, None without a section; ``maps`` of the fretting
-    parameter over the face by their names in ``results.h5``, each ``(..., nx, ny)``.
+    ``section`` ``(6, n, k)`` [MPa] is the stress at peak load, or None if no section is requested.
+    ``maps`` are those of the fretting parameter over the face, each ``(..., nx, ny)``, by their
+    names in ``results.h5``.
     """
 
     section: Array | None
@@ -63,11 +65,11 @@ class BodyStress:
 
 @dataclass(frozen=True)
 class ContactMoment:
-    """The bodies under one contact by their numbers, unworn or worn: a rigid one is not there.
+    """Stresses of the deformable bodies under one contact, by body number, unworn or worn.
 
-    ``carried`` is what a structure carries past the contact, where it tells;
-    ``left_out`` are the increments, counted from 0, whose shear is not known (see
-    :class:`wear.contact.tractions.CycleTractions`) and that the maps do without.
+    ``carried`` is the stress that a structure carries past the contact, where it is known.
+    ``left_out`` are the increments, counted from 0, whose shear is unknown (see
+    :class:`wear.contact.tractions.CycleTractions`) and which the maps leave out.
     """
 
     bodies: Mapping[Literal[1, 2], BodyStress]
@@ -76,7 +78,7 @@ class ContactMoment:
 
     @property
     def bulk(self) -> bool:
-        """Whether the stress that a structure carries past the contact is in that of all."""
+        """Whether all bodies include the stress that a structure carries past the contact."""
         return len(self.carried) == len(self.bodies)
 
 
@@ -93,7 +95,7 @@ class InterfaceStress:
 
     @property
     def bulk(self) -> bool:
-        """Whether the stress that a structure carries past the contact is in all of it."""
+        """Whether all moments include the stress that a structure carries past the contact."""
         return all(moment.bulk for moment in self.moments.values())
 
     @property
@@ -110,11 +112,11 @@ class InterfaceStress:
 
     @property
     def _bodies(self) -> list[BodyStress]:
-        """All bodies at all moments."""
+        """Stresses of all bodies, unworn and worn."""
         return [body for moment in self.moments.values() for body in moment.bodies.values()]
 
     def write(self, writer: ResultsWriter) -> None:
-        """Sections into ``stress/section``, maps into ``stress/life``, by interface."""
+        """Write sections to ``stress/section`` and maps to ``stress/life``, by interface."""
         if self.planes.settings.section != "none":
             self._write_section(writer, f"stress/section/{self.name}")
         if self.mapped:
@@ -148,7 +150,7 @@ class InterfaceStress:
         writer.put(group, {}, **attributes)
 
     def summary(self) -> dict[str, Any]:
-        """Largest values, where they are, and worn over unworn, by body."""
+        """Return the largest values, their places and their ratios worn to unworn, by body."""
         numbers: dict[str, Any] = {"convolutions": self.convolutions, "bulk": self.bulk}
         if self.planes.settings.section != "none":
             numbers["von_mises"] = self._of_bodies(self._largest_von_mises)
@@ -173,7 +175,7 @@ class InterfaceStress:
 
     def _largest_von_mises(self, body: BodyStress) -> dict[str, float]:
         assert body.section is not None
-        # Outside the body it is not a number.
+        # Stress outside the body is nan.
         values, planes = np.nan_to_num(von_mises(body.section)), self.planes
         i, k = np.unravel_index(first_largest(values), values.shape)
         along, across = ("y", "x") if planes.settings.section == "y" else ("x", "y")
@@ -194,10 +196,10 @@ def contact_stresses(
     reporter: Reporter,
     progress: Progress,
 ) -> list[InterfaceStress]:
-    """Stress under all ``contacts`` as the case asks for it.
+    """Return the stresses under all ``contacts`` that the case requests.
 
-    Each has what is known of an unworn and a worn cycle; ``peak`` is the increment of peak load.
-    ``progress`` is told the bodies that are done, unworn and worn.
+    Each contact comes with an unworn and a worn cycle; ``peak`` is the increment of peak load.
+    ``progress`` is called with the number of bodies done, unworn and worn.
     """
     unknown = [cycle.tractions.unknown for _, cycles in contacts for cycle in cycles]
     _report_stick(np.array(unknown), peak, reporter)
@@ -237,7 +239,7 @@ def _interface_stress(
 def _drawn(
     settings: ContactStress, stressed: Sequence[Sequence[Stressed]], planes: Planes, peak: int
 ) -> list[list[Array | None]]:
-    """Sections of all bodies by moment, None where none is asked for."""
+    """Return the sections of all bodies by moment, None where no section is requested."""
     if settings.section == "none":
         return [[None for _ in bodies] for bodies in stressed]
     found = iter(sections([one for bodies in stressed for one in bodies], planes, peak))
@@ -262,10 +264,10 @@ def _moment(
 
 
 def life_maps(life: Life, stressed: Stressed, known: Mask) -> dict[str, Dataset]:
-    """Maps of the parameter and of what it is made of, at the critical distance, by name.
+    """Return maps of the parameter and its factors at the critical distance, by name.
 
-    Stress is that of the ``known`` ``(t,)`` increments, of all cycles of a mix together; friction
-    work that of all increments in a mean cycle.
+    Stress is that of the ``known`` ``(t,)`` increments in all cycles of a mix; friction work is
+    that of all increments in a mean cycle.
     """
     body, cycle, bulk = stressed
     if life.parameter == "ruiz":
@@ -276,13 +278,13 @@ def life_maps(life: Life, stressed: Stressed, known: Mask) -> dict[str, Dataset]
 
 
 def _whose(bulk: bool) -> str:
-    """Whose stress it is, in words."""
+    """Return the origin of the stress, in words."""
     alone = "under the contact's tractions alone"
     return "of the contact and of what the structure carries past it" if bulk else alone
 
 
 def _section(stress: Array, bulk: bool) -> dict[str, Dataset]:
-    """Stress ``(6, n, k)`` in a section, and its equivalent."""
+    """Return the datasets of stress ``(6, n, k)`` in a section and its von Mises stress."""
     what = f"xx, yy, zz, xy, yz, zx in the section at peak load, {_whose(bulk)}"
     return {
         "stress": Dataset(stress, "MPa", what),
@@ -291,14 +293,14 @@ def _section(stress: Array, bulk: bool) -> dict[str, Dataset]:
 
 
 def mean_work(cycle: CycleTractions) -> Array:
-    """Friction work per area of all increments in a mean cycle ``(nx, ny)`` [N/mm]."""
+    """Return the friction work per area in a mean cycle, all increments ``(nx, ny)`` [N/mm]."""
     return np.tensordot(cycle.loads.share, cycle.work, 1)
 
 
 def plane_maps(life: Life, history: Array, material: Material, bulk: bool) -> dict[str, Dataset]:
-    """Maps of a parameter of critical planes from a stress ``history`` ``(t, 6, nx, ny)``.
+    """Return maps of a critical-plane parameter for a stress ``history`` ``(t, 6, nx, ny)``.
 
-    With or without ``bulk`` stress in it.
+    ``bulk`` says whether the history includes the stress carried past the contact.
     """
     if life.parameter == "findley":
         plane = findley(history, life.sensitivity)
@@ -320,7 +322,7 @@ def plane_maps(life: Life, history: Array, material: Material, bulk: bool) -> di
 
 
 def ruiz_maps(parameters: Ruiz, bulk: bool) -> dict[str, Dataset]:
-    """Maps of Ruiz's parameters, with or without ``bulk`` stress in the tension."""
+    """Return maps of Ruiz's parameters, whose tension may include ``bulk`` stress."""
     work = "Ruiz's F1: a quarter of the friction work of a cycle per area"
     tension = f"largest tension along the surface over a cycle, {_whose(bulk)}"
     cracking = "Ruiz's F2: F1 times tension"
@@ -332,7 +334,7 @@ def ruiz_maps(parameters: Ruiz, bulk: bool) -> dict[str, Dataset]:
 
 
 def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
-    """Say where the shear is not known, ``unknown`` ``(cycles, t)``; warn if so at peak load."""
+    """Warn of increments with unknown shear, given its load share ``unknown`` ``(cycles, t)``."""
     why = "contact.method: normal does not know the shear where a contact sticks; full does"
     worst = unknown.max(axis=0)
     if worst[peak] > STUCK_SHARE:
@@ -348,7 +350,7 @@ def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
 
 
 def _report_carried(stress: InterfaceStress, reporter: Reporter) -> None:
-    """Warn where what a structure carries past a contact is not known, or not well."""
+    """Warn if the stress carried past a contact is unknown or inaccurate."""
     if not stress.bulk:
         reporter.warn(
             f"{stress.name}: too few nodes near the contact to tell what the structure carries "

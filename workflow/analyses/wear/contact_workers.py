@@ -1,4 +1,4 @@
-"""Contact stages in processes of their own, one for each interface."""
+"""Contacts in worker processes, one process for each interface."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from workflow.models.contacts import FaceContacts
 from workflow.models.loads import ContactFace
 from workflow.shell.processes import Done, Workers, workers
 
-# Increments with friction of the first jump over those of the first cycle, as far as that is known
-# beforehand: implicit steps march the cycle on the surfaces they lead to; later jumps, which know
-# what steps of twice the length leave, on those of these too.
+# Estimated ratio of frictional increments in the first jump to those in the first cycle. Implicit
+# steps solve the cycle on the new surfaces; later jumps, which have a coarse companion, also solve
+# it on the companion's.
 FIRST_JUMP = 2
 
 
 def contact_workers(
     case: WearCase, faces: Sequence[ContactFace]
 ) -> AbstractContextManager[Workers]:
-    """Start a worker for every face of a case and end them all at the end."""
+    """Start a worker process for every face of a case, and end all of them on exit."""
     return workers(partial(_worker, case), faces)
 
 
 def _worker(case: WearCase, face: ContactFace, solved: Done) -> Callable[..., Any]:
-    """What answers for one contact, made where it is to live; ``solved`` is told of increments."""
+    """Return the function that answers for one contact; ``solved`` is called per increment."""
     stage = face_contact(case, face)
     stage.solved = solved
     contacts = Contacts([stage])
@@ -46,7 +46,7 @@ def _worker(case: WearCase, face: ContactFace, solved: Done) -> Callable[..., An
 
 
 class ContactProcesses(FaceContacts):
-    """Contacts that wear side by side; what is quick is done here, by ``stages`` like theirs."""
+    """Contacts that wear in parallel processes; quick tasks run here on equal ``stages``."""
 
     def __init__(self, stages: Sequence[FaceContact], team: Workers) -> None:
         super().__init__(stages)
@@ -72,7 +72,7 @@ class ContactProcesses(FaceContacts):
         return self._team.begin("end", states)
 
     def _counted(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
-        """What they answer; the next jump is expected to take as many increments as this did."""
+        """Return the workers' answers; the increments of a call are the next call's estimate."""
         progress = self._progress
 
         def told(done: int, expected: int) -> None:

@@ -1,6 +1,6 @@
-"""Faces, surfaces and kinetics of worn contacts as datasets, whichever analysis has them.
+"""Faces, surfaces and kinetics of worn contacts as datasets, for all analyses that have them.
 
-Extensive quantities are in the units of a contact over an area.
+Extensive quantities have the units of a contact over an area.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from workflow.analyses.contact.datasets import (
 from workflow.shell.dataset import Dataset
 from workflow.shell.results import ResultsWriter
 
-# Group of body 1's face, below the contact's own, which is body 2's.
+# Group of the face of body 1, below that of the contact, which is the face of body 2.
 OTHER_FACE = "face_1"
 
 
 def face_mesh(face: Face) -> dict[str, Dataset]:
-    """Nodes ``(n, 2)`` and facets ``(m, 3)``, in a line contact ``(m, 2)``, of a face."""
+    """Return nodes ``(n, 2)`` and facets ``(m, 3)``, in a line contact ``(m, 2)``, of a face."""
     facets = "corner nodes of the triangles, or of the segments of a line contact"
     return {
         "coordinates": Dataset(face.coordinates, "mm", "nodes in the interface frame"),
@@ -39,10 +39,10 @@ def put_face(
     drive: Drive | None = None,
     slip_known: bool = True,
 ) -> None:
-    """A contact face over a cycle; forces, tractions and displacements where these are known.
+    """Write a contact face over a cycle, with forces, tractions and displacements if known.
 
-    Where a ``drive`` imposes a tilt, the loads have no moment of the pressure about its axis; slip
-    and energies are left out where the loads do not tell them.
+    Where a ``drive`` imposes a tilt, the loads have no moment of the pressure about its axis. Slip
+    and energies are left out where the loads do not include them.
     """
     columns = load_columns(carried.loads)
     for name, k in zip(("Mx", "My"), TILTS, strict=True):
@@ -63,7 +63,7 @@ def put_face(
 
 
 def nodal_solution(force: Array, displacement: Array) -> dict[str, Dataset]:
-    """Forces and displacements ``(t, 3, n)`` at the nodes of a face."""
+    """Return the datasets of forces and displacements ``(t, 3, n)`` at the nodes of a face."""
     moved = "of body 2 relative to body 1 since both were unloaded and unworn, x, y and z"
     return {
         "force": Dataset(force, "N", "of body 1 on body 2 at the nodes, x, y and z"),
@@ -72,7 +72,7 @@ def nodal_solution(force: Array, displacement: Array) -> dict[str, Dataset]:
 
 
 def surface_heights(body_1: Array, body_2: Array) -> dict[str, Dataset]:
-    """Heights ``(nx, ny)`` of both bodies."""
+    """Return the datasets of the heights ``(nx, ny)`` of both bodies."""
     return {
         f"body_{body}": Dataset(height, "mm", f"height of body {body} in the interface frame")
         for body, height in enumerate((body_1, body_2), start=1)
@@ -80,12 +80,12 @@ def surface_heights(body_1: Array, body_2: Array) -> dict[str, Dataset]:
 
 
 def cycles_column(cycles: Array) -> Dataset:
-    """The cycles ``(n,)`` at which kinetics are known."""
+    """Return the dataset of the cycles ``(n,)`` of the kinetics."""
     return Dataset(cycles, "1", "cycles")
 
 
 def kinetics_columns(kinetics: Array, area: Array) -> dict[str, Dataset]:
-    """What a contact has lost and dissipated over the cycles, and its area, ``(n,)`` each.
+    """Return datasets of wear, dissipated energy and contact area over the cycles, ``(n,)`` each.
 
     ``kinetics`` ``(n, 5)`` has depths and volumes of both bodies, and the energy.
     """

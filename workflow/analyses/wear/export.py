@@ -1,4 +1,4 @@
-"""``fretscale resultants``: what the structure does to its contacts, as files."""
+"""``fretscale resultants``: the loads of a structure's contacts, written to files."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from workflow.shell.lock import locked
 from workflow.shell.reporter import Reporter
 from workflow.shell.store import write_text
 
-# How other codes write such files.
+# Guide to writing such files with other codes.
 RECIPE = Path(resultants.__file__).with_name("RECIPE.md")
 TABLE, FIELDS, CASE, LOG = "resultants.csv", "resultants.h5", "resultants.yaml", "resultants.log"
 
 
 def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list[str]:
-    """Solve the structure of a case and write its loads; lines that say what to do with them.
+    """Solve the structure of a case and write its loads; return lines that explain the files.
 
     ``name`` is that of the case in messages. Raises UserError, MethodFailed, OutOfMemory.
     """
@@ -88,7 +88,7 @@ def _write(case: WearCase, source: StructureLoads, out: Path, reporter: Reporter
         }
     assert isinstance(case, FiniteElementCase)
     warn_of_structure(case, source, reporter)
-    # All contacts are alike, or they were refused.
+    # All contacts have equal terms here: others were refused.
     cells = case.every_terms[0].grid
     heights = {face.face.name: gap_on(face, face.grid(cells)) for face in faces}
     loads = {name: history.loads for name, history in histories.items()}
@@ -100,7 +100,7 @@ def _write(case: WearCase, source: StructureLoads, out: Path, reporter: Reporter
 
 
 def _numbered(source: StructureLoads, history: InterfaceHistory) -> InterfaceHistory:
-    """The history with the user's own node numbers, where the mesh has them."""
+    """Return the history with the user's node numbers, where the mesh has them."""
     face = history.interface
     if not isinstance(face, Interface):
         return history
@@ -112,7 +112,7 @@ def _numbered(source: StructureLoads, history: InterfaceHistory) -> InterfaceHis
 
 
 def _imported(case: WearCase, faces: tuple[ContactFace, ...], out: Path) -> ResultantsCase:
-    """The case with the loads of the files in the place of its structure."""
+    """Return the case with the loads of the files instead of its structure."""
     shared = ResultantsCase.model_fields.keys() & type(case).model_fields.keys()
     data = case.model_dump(
         include=shared - {"structure", "assumed", "measured", "expect"}, exclude_none=True
@@ -120,16 +120,16 @@ def _imported(case: WearCase, faces: tuple[ContactFace, ...], out: Path) -> Resu
     for section in ("materials", "wear"):
         for number, body in enumerate(case.bodies, start=1):
             data[section][f"body_{number}"] = data[section].pop(body)
-            data[section][f"body_{number}"].pop("density", None)  # the loads know of it
+            data[section][f"body_{number}"].pop("density", None)  # the loads include its effect
     data["structure"] = _structure(faces)
     imported = ResultantsCase.model_validate(data, context={"folder": str(out)})
-    # The files stay together wherever they go.
+    # A relative path keeps the files usable together when they are moved.
     beside = imported.structure.model_copy(update={"file": FIELDS})
     return imported.model_copy(update={"structure": beside})
 
 
 def _structure(faces: tuple[ContactFace, ...]) -> dict[str, Any]:
-    """The structure of that case: faces in their order, sizes to the last digit."""
+    """Return the structure of the exported case: faces in their order, with exact sizes."""
     line = faces[0].face.line
     sizes = [face.size[0] if line else list(face.size) for face in faces]
     interfaces = [

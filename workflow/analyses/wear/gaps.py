@@ -1,4 +1,4 @@
-"""Gap of the unloaded bodies over a face, as a function of the place on it."""
+"""Gap of the unloaded bodies over a face, as a function of the position on it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from workflow.models.gaps import AddedGap, GapFunction, GridHeights
 
 @dataclass(frozen=True)
 class MeasuredHeights:
-    """Gap of surfaces as measured, on the cells of any grid over a face.
+    """Gap of measured surfaces, as means over the cells of any grid on a face.
 
     ``face`` is a grid of the size of the face.
     """
@@ -28,21 +28,21 @@ class MeasuredHeights:
     def __call__(self, x: Array, y: Array) -> Array:
         """Return means over cells centred at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``."""
         grid = Grid.over(self.face.size, (x.size, y.size), self.face.line)
-        # No other places are asked for.
+        # The function is called only at the centres of a grid over the whole face.
         assert np.allclose(grid.x, x)
         assert np.allclose(grid.y, y)
         return self.surfaces.gap(grid)
 
 
 def with_measured(form: GapFunction, surfaces: SurfacesOfTwo | None, face: Grid) -> GapFunction:
-    """Return the gap of a form, and of measured surfaces where there are any."""
+    """Return the gap of a form, plus that of measured surfaces if there are any."""
     return form if surfaces is None else AddedGap(MeasuredHeights(surfaces, face)).on(form)
 
 
 def gap_over(shape: GapShape | None, heights: Array | None, grid: Grid) -> GapFunction:
-    """Gap [mm] at x and y of a face that ``grid`` covers.
+    """Return the gap [mm] as a function of x and y on the face that ``grid`` covers.
 
-    ``heights`` on the grid count where the case gives no shape; without either it is 0.
+    ``heights`` on the grid apply if the case gives no shape; without either the gap is 0.
     """
     match shape:
         case RoundedGap():

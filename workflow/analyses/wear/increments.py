@@ -1,11 +1,12 @@
-"""As many increments of a structure's cycle as an error asks for (``load_path.increments: auto``).
+"""Choice of increments of a structure's cycle for an error (``load_path.increments: auto``).
 
-The structure's own cycle is solved, unworn, in few increments, and what each leg of them leaves of
-worn depth and energy is estimated (:func:`sa_solver.cycles.increments.errors_of_increments`). That
-is of second order: a leg of n increments leaves c/n². The fewest in all, Σ n, of a given Σ c/n²
-have n in proportion to the cubic root of c, so that legs along which much slips under pressures
-that bend get the most. Twice as many then say what these leave indeed (Richardson): where a front
-of slip passes node by node the estimate from one cycle is too low, by up to five on dovetails.
+The unworn cycle of the structure is solved in few increments, and the error of worn depth and
+energy due to each leg is estimated (:func:`sa_solver.cycles.increments.errors_of_increments`). The
+error is of second order: a leg of n increments causes c/n². The smallest total Σ n for a given
+Σ c/n² has n in proportion to the cubic root of c, so that legs with much slip under curved pressure
+histories get the most. A cycle with twice as many increments then measures the error (Richardson):
+where a front of slip passes node by node, the estimate from one cycle is too low, by a factor of up
+to five on dovetails.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from workflow.errors import MethodFailed
 from workflow.models.structure import StructureModel
 
 ENTRY = "load_path.increments"
-# Of a leg: two leave 6 % of the depth of a dovetail and are estimated to leave 0.2 %, since what
-# bends within an increment is seen by its neighbours.
+# Least increments of a leg. Two cause 6 % of error in the depth of a dovetail but an estimate of
+# 0.2 %, because the estimate sees curvature within an increment only through its neighbours.
 FEWEST = 4
-# Each try but the first is so much finer than the one before it, at least and at most: where fronts
-# of slip pass node by node the order is nearer to one than to two.
+# Least and largest factor of refinement from one try to the next: where fronts of slip pass node by
+# node, the order is nearer to one than to two.
 FINER, FINEST = 1.4, 2.0
-# Where something rubs, and nothing tells how pressures bend over slip.
+# Error of slip whose pressure history cannot be estimated.
 UNKNOWN = inf
 
 Counts = tuple[int, ...]
@@ -48,9 +49,9 @@ AnyCase = TypeVar("AnyCase", bound=FiniteElementCase)
 def choose_increments(
     case: AnyCase, model: Callable[[AnyCase], StructureModel]
 ) -> tuple[AnyCase, dict[str, Any]]:
-    """Return the case with as many increments as ``wear.tolerance`` asks for, and a record of why.
+    """Return the case with the increments that ``wear.tolerance`` needs, and a record of why.
 
-    ``model`` makes a structure of such a case, or one that stands for it. Raises what that raises.
+    ``model`` returns the structure of such a case, or a substitute. Raises the errors of ``model``.
     """
     begin, allowed = time.perf_counter(), case.wear.tolerance
     decision = decide_increments(case, model, allowed)
@@ -62,7 +63,7 @@ def choose_increments(
 def decide_increments(
     case: AnyCase, model: Callable[[AnyCase], StructureModel], allowed: float
 ) -> Decision:
-    """As many increments as leave no more than ``allowed`` of depth and energy, if there are."""
+    """Return the least increments with errors of depth and energy up to ``allowed``, if any."""
     cycle = _Cycle(case, model)
     counts = cycle.expected(allowed)
     tried = [(counts, cycle.error(counts))]
@@ -95,7 +96,10 @@ class _Cycle(Generic[AnyCase]):
         return changed(self._case, self._case.divided(counts))
 
     def _solved(self, counts: Counts) -> Histories | None:
-        """What all faces do, None where so few increments do not converge; MethodFailed of many."""
+        """Return the histories of all faces, or None if few increments do not converge.
+
+        Raises MethodFailed if the largest number of increments does not converge.
+        """
         try:
             cycles = self._model(self._of(counts)).load_cycles
             return self._stage.cycle_under(cycles).histories
@@ -105,7 +109,7 @@ class _Cycle(Generic[AnyCase]):
             return None
 
     def expected(self, allowed: float) -> Counts:
-        """The fewest increments of each leg that are estimated, by cycles of few, to be enough."""
+        """Return the least increments of each leg that coarse cycles predict to be sufficient."""
         counts = self._few
         while sum(counts) < MOST_INCREMENTS:
             histories = self._solved(counts)
@@ -118,7 +122,7 @@ class _Cycle(Generic[AnyCase]):
         return counts
 
     def error(self, counts: Counts) -> float:
-        """What so many increments leave, by as many again."""
+        """Return the error of ``counts`` increments, by comparison with twice as many."""
         coarse, fine = self._solved(counts), self._solved(tuple(2 * count for count in counts))
         if coarse is None or fine is None:
             return UNKNOWN
@@ -126,7 +130,10 @@ class _Cycle(Generic[AnyCase]):
 
 
 def _capped(counts: Sequence[int]) -> Counts:
-    """These, or the most in all, shared out alike; the longest leg takes what rounding leaves."""
+    """Return the counts, scaled down to the largest total if they exceed it.
+
+    The longest leg gets the remainder of the rounding.
+    """
     if sum(counts) <= MOST_INCREMENTS:
         return tuple(counts)
     capped = [max(1, MOST_INCREMENTS * count // sum(counts)) for count in counts]
@@ -135,9 +142,10 @@ def _capped(counts: Sequence[int]) -> Counts:
 
 
 def left_by_legs(histories: Histories, counts: Counts) -> list[float] | None:
-    """Estimates of what a cycle of so many increments in each leg leaves, by leg; None: unknown.
+    """Return the estimated error due to each leg's increments, or None if it is unknown.
 
-    Relative to depth and energy of a face, or to a share of another's that is rubbed much more.
+    Errors are relative to depth and energy of a face, or to a share of those of a face that is
+    rubbed much more.
     """
     works = [_work(history).sum(axis=0) for history in histories]
     ends, left = np.cumsum((0, *counts)), np.zeros(len(counts))
@@ -154,7 +162,7 @@ def left_by_legs(histories: Histories, counts: Counts) -> list[float] | None:
 
 
 def differences(coarse: Histories, fine: Histories) -> Array:
-    """Largest relative differences ``(2,)`` of what two cycles wear: depth and energy of a face."""
+    """Return the largest relative differences ``(2,)`` of depth and energy between two cycles."""
     works = [_work(history).sum(axis=0) for history in fine]
     largest = np.zeros(2)
     for history, other, work, scale in zip(fine, coarse, works, _scales(fine, works), strict=True):
@@ -165,13 +173,13 @@ def differences(coarse: Histories, fine: Histories) -> Array:
 
 
 def _rubbing(history: InterfaceHistory) -> tuple[Array, Array, Mask, list[slice]]:
-    """Pressure times how often it acts, slip, and what else the sums over increments need."""
+    """Return pressure times frequency, slip, and the masks and slices for sums over increments."""
     loads = history.loads
     return loads.share[:, None] * history.pressure, history.slip, loads.P > 0.0, loads.missions
 
 
 def _work(history: InterfaceHistory) -> Array:
-    """Work of increments over µ, per area of each node ``(t, n)`` [N/mm]."""
+    """Return the work of the increments over µ per area of each node ``(t, n)`` [N/mm]."""
     return friction_work(*_rubbing(history))
 
 
@@ -180,6 +188,6 @@ def _size(history: InterfaceHistory, work: Array) -> Array:
 
 
 def _scales(histories: Histories, works: Sequence[Array]) -> Array:
-    """What errors of each face are relative to ``(faces, 2)``."""
+    """Return the values that errors of each face are relative to ``(faces, 2)``."""
     sizes = np.array([_size(*pair) for pair in zip(histories, works, strict=True)])
     return np.asarray(np.maximum(sizes, LESSER_FLANK * sizes.max(axis=0)))

@@ -1,15 +1,15 @@
-"""What a wear run's ``results.h5`` holds, for those who draw it."""
+"""Contents of a wear run's ``results.h5``, for the code that draws it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 MOMENTS = "unworn", "worn"
-# How far kinetics are extended, in computed numbers of cycles.
+# Ratio of the cycles to which kinetics are extrapolated to the computed cycles.
 EXTRAPOLATION = 2.0
-# What leaves errors, in the order of their datasets.
+# Sources of error, in the order of their datasets.
 PARTS = ("link", "mesh", "increments", "grid", "steps", "coupling", "solver")
-# Results that have errors, by their names and in words: what is worn, pressures, and the rest.
+# Results with estimated errors, by name and in words: wear, pressures, and others.
 WORN = {"depth": "depth", "volume": "volume"}
 PRESSURES = {
     "peak_pressure": "unworn peak pressure",
@@ -19,30 +19,30 @@ RESULTS = WORN | PRESSURES | {"life": "fretting parameter", "notch_stress": "not
 
 
 def energy_name(nodes: bool) -> str:
-    """The energies dissipated in a cycle by what wears: nodes, or a half-space."""
+    """Return the dataset of energy per cycle, dissipated at nodes or by a half-space."""
     return "energy_nodes" if nodes else "energy_half_space"
 
 
 def jump_name(number: int) -> str:
-    """The group of a jump, below that of its interface."""
+    """Return the group of a jump, below that of its interface."""
     return f"{number:05d}"
 
 
 @dataclass(frozen=True)
 class Contents:
-    """What is there beside loads, contact, surfaces and kinetics of the interfaces ``names``.
+    """Optional contents of the results; loads, contact, surfaces and kinetics are always there.
 
-    ``bodies`` are the names of body 1 and 2, ``jumps`` how many there are beside the unworn state.
-    ``line`` contacts have forces and energies per length, a ``mix`` of missions has the share of
-    each; ``dissipation`` says whether the loads tell what they dissipate; ``bolts`` are the names
-    of those that the loads tighten. A ``structure`` of finite
-    elements gives tractions at its nodes, and all bodies unworn and worn, with ``mission`` over
-    the increments too; its ``nodes`` wear, or half-spaces. ``coarse`` are the interfaces with a
-    solution on a coarse grid. The rest is there where a case asks for it: a ``comparison`` of
-    half-space and structure, tangential ``loops``, ``sections`` of the stress under the contacts,
-    and the interfaces with maps of fretting ``life``, of which only those ``cracking`` are above 0
-    anywhere; the bodies ``strained`` have such stresses, a rigid one has none. ``worn`` says
-    whether anything has been lost.
+    ``names`` are the interfaces and ``bodies`` the names of body 1 and body 2. ``jumps`` is their
+    number without the unworn state. ``line`` contacts have forces and energies per length; a
+    ``mix`` of missions has the share of each. ``dissipation`` says whether the loads include
+    dissipated energy. ``bolts`` are the names of the bolts that the loads tighten. A finite element
+    ``structure`` has nodal tractions and all bodies unworn and worn, with a ``mission`` also over
+    the increments; ``nodes`` says that its nodes wear instead of half-spaces. ``coarse`` are the
+    interfaces with a solution on a coarse grid. The case may request a ``comparison`` of half-space
+    and structure, tangential ``loops``, ``sections`` of the stress under the contacts, and maps of
+    fretting ``life`` for the named interfaces; only the ``cracking`` ones are above 0 anywhere. The
+    ``strained`` bodies have such stresses; a rigid body has none. ``worn`` says whether anything
+    has worn.
     """
 
     names: tuple[str, ...]
@@ -71,26 +71,26 @@ class Contents:
 
     @property
     def ends(self) -> list[tuple[str, str]]:
-        """Unworn and worn, each with its jump: both with the only one where nothing wore."""
+        """Unworn and worn state with their jumps, which are the same if nothing wore."""
         names = self.jump_names
         return [("unworn", names[0]), ("worn", names[-1])]
 
     @property
     def states(self) -> list[tuple[str, str]]:
-        """The same, but one of each: unworn alone where nothing wore."""
+        """Distinct states of :attr:`ends`: only the unworn one if nothing wore."""
         return self.ends if self.jumps else self.ends[:1]
 
     @property
     def wears(self) -> str:
-        """What wears, in words."""
+        """The worn model, in words."""
         return "nodes" if self.nodes else "half-space"
 
     @property
     def loads(self) -> str:
-        """Where the loads are from, in words."""
+        """The origin of the loads, in words."""
         return "finite elements" if self.structure else "imposed loads"
 
     @property
     def per(self) -> str:
-        """What units of forces and energies end in."""
+        """Suffix of the units of forces and energies."""
         return "/mm" if self.line else ""

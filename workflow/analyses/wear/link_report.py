@@ -1,4 +1,4 @@
-"""What a run says of the link of its structure to the contact: see :mod:`wear.contact.link`."""
+"""Report on the link of the structure to the contact: see :mod:`wear.contact.link`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from workflow.shell.reporter import Reporter
 
 
 def link_summary(link: Link) -> dict[str, Any]:
-    """The link to the unworn structure; all but ``corrected`` only where it is.
+    """Return the summary of the link to the unworn structure, with details if it is corrected.
 
     Displacements are relative to the deflection of the half-spaces at the largest load.
     """
@@ -27,7 +27,7 @@ def link_summary(link: Link) -> dict[str, Any]:
 
 
 def report_link(name: str, link: Link, line: bool, reporter: Reporter) -> None:
-    """Say how a contact is linked, and warn where the fit leaves more than graininess."""
+    """Log how a contact is linked, and warn if the fit error exceeds the graininess."""
     if not link.corrects:
         reporter.log(f"{name}: the bodies are taken for half-spaces")
         return

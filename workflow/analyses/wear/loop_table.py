@@ -1,4 +1,4 @@
-"""The table of tangential loops that joint laws read: a row per loop, computed or measured."""
+"""Table of tangential loops for joint laws: one row per loop, computed or measured."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from workflow.shell.tables import heading, write_table
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table: ``unit`` is the base unit, ``shown`` the unit it is written in.
+    """Column of the table: ``unit`` is the base unit, ``shown`` the unit in the file.
 
     ``extensive`` quantities are per mm in a line contact.
     """
@@ -31,14 +31,14 @@ class Column:
     extensive: bool = True
 
     def units(self, per_length: bool) -> tuple[str, str]:
-        """Base unit and the one written."""
+        """Return the base unit and the unit in the file."""
         per = "/mm" if per_length and self.extensive else ""
         return self.unit + per, self.shown + per
 
     def written(
         self, rows: Sequence[Mapping[str, float]], per_length: bool
     ) -> tuple[str, list[float]]:
-        """Heading and values of the column, in the unit in which it is written."""
+        """Return heading and values of the column, in the unit of the file."""
         base, unit = self.units(per_length)
         factor = to_base(f"1 {unit}", base) if unit != base else 1.0
         return heading(self.name, unit), [row[self.name] / factor for row in rows]
@@ -61,19 +61,19 @@ COLUMNS = (
     Column("mu_error", "1", "1", "of mu by grid and increments", extensive=False),
     Column("energy_per_loop_error", "N*mm", "mJ", "of energy_per_loop by grid and increments"),
 )
-# Share of P that slips from which on mu is the coefficient of friction, not only what is mobilised.
+# Share of P that must slip for mu to be the coefficient of friction, not just what is mobilised.
 SLIDES = 1.0 - 1e-6
-# Of a table that joint laws read again.
+# Significant digits, since joint laws read the table again.
 DIGITS = 12
-# Without these a table is none.
+# Columns that every table must have.
 NEEDED = ("energy", "P", "kt", "mu")
 
 
 @dataclass(frozen=True)
 class LoopTable:
-    """What joint laws read of a table of loops, ``(k,)`` each, in base units: see ``COLUMNS``.
+    """Columns of a table of loops that joint laws use, ``(k,)`` each, in base units (``COLUMNS``).
 
-    ``energy`` ascends. ``sliding`` is 1 where the table does not say. ``per_length`` says that
+    ``energy`` ascends. ``sliding`` is 1 if the table does not have it. ``per_length`` says that
     energies, forces and stiffnesses are per mm.
     """
 
@@ -88,23 +88,23 @@ class LoopTable:
 def write_loop_table(
     path: Path, rows: Sequence[Mapping[str, float]], per_length: bool = False
 ) -> None:
-    """Write a table of loops, whose ``rows`` are in base units and have the same columns."""
+    """Write a table of loops; all ``rows`` are in base units and have the same columns."""
     columns = [column for column in COLUMNS if column.name in rows[0]]
     write_table(path, dict(column.written(rows, per_length) for column in columns), DIGITS)
 
 
 def read_loop_table(path: Path) -> LoopTable:
-    """The table of loops in file ``path``, of a wear run or measured, in base units.
+    """Return the table of loops in file ``path``, of a wear run or measured, in base units.
 
-    Headings are the names of ``COLUMNS``, each with any unit of its kind in brackets, or in its
-    base unit without. Raises UserError for a file that is no such table.
+    Headings are the names of ``COLUMNS``, each with a compatible unit in brackets, or without one
+    in its base unit. Raises UserError for a file that is no such table.
     """
     try:
         table = read_table_file(path)
         table.require(NEEDED, f"at least {', '.join(NEEDED)}")
         per_length = _per_length(table)
         units = {column.name: column.units(per_length)[0] for column in COLUMNS}
-        # Other columns may be slips of the pen for those that need not be given.
+        # Unknown columns may be misspelt optional ones.
         table.check(units)
         columns = {name: table.column(name, Quantity(units[name])) for name in table.names}
     except InputFileError as error:
@@ -119,7 +119,7 @@ def read_loop_table(path: Path) -> LoopTable:
 
 
 def _per_length(table: TableFile) -> bool:
-    """Whether the table is of a line contact: by the unit of its stiffness."""
+    """Return whether the table is of a line contact, by the unit of its stiffness."""
     (kt,) = (column for column in COLUMNS if column.name == "kt")
     try:
         to_base(f"1 {table.unit('kt') or kt.unit}", kt.units(True)[0])

@@ -1,4 +1,4 @@
-"""What wear runs are compared by in a chart: depths and volumes, sections and profiles."""
+"""Quantities for comparing wear runs in a chart: depths and volumes, sections and profiles."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from workflow.shell.analysis import Comparison, Summary
 
 WORN = ("depth_1", "depth_2", "volume_1", "volume_2")
 MIDDLE = "middle"
-# Rows on either side of the middle of a face whose mean is its middle section.
+# Rows on either side of the middle of a face that are averaged for its middle section.
 MIDDLE_ROWS = 1
-# Name of the difference of worn depth anywhere.
+# Name of the largest difference of the worn depth over the face.
 PROFILE = "depth anywhere"
-# Overrides that leave out what only quantities below these entries need.
+# Overrides, by entry of the summary, that skip what only quantities below the entry need.
 PLAIN = {
     "stress": ("stress.section=none", "stress.life.parameter=none"),
     "error": ("error_budget=known",),
@@ -27,19 +27,19 @@ PLAIN = {
 
 
 def quantities(case: WearCase, summary: Summary) -> list[str]:
-    """Depth and volume of every body of every interface."""
+    """Return the paths of depth and volume of every body of every interface."""
     return [f"{name}.{worn}" for name, worn in product(interfaces(summary), WORN)]
 
 
 def interfaces(summary: Mapping[str, Any]) -> list[str]:
-    """Names of the contacts of a wear run."""
+    """Return the names of the contacts of a wear run."""
     return [
         name for name, part in summary.items() if isinstance(part, Mapping) and "depth_1" in part
     ]
 
 
 def extra_quantities(summary: Mapping[str, Any]) -> list[str]:
-    """Numbers of a wear run that are told beside the quantities."""
+    """Return the paths of numbers that are reported in addition to the quantities."""
     return [f"{name}.peak_pressure.worn" for name in interfaces(summary)]
 
 
@@ -50,8 +50,8 @@ WornDepths = Mapping[str, tuple[Grid, Array, Array]]
 
 
 def worn_depths(folder: Path, names: Iterable[str]) -> WornDepths:
-    """Grid of each interface and worn depths ``(nx, ny)`` of body 1 and body 2 [mm]."""
-    # Files are read when runs are compared, not when a case is.
+    """Return the grid of each interface and worn depths ``(nx, ny)`` of both bodies [mm]."""
+    # Imported here, because files are read only when runs are compared.
     import h5py
 
     from workflow.shell.folder import OutputFolder
@@ -68,9 +68,9 @@ def worn_depths(folder: Path, names: Iterable[str]) -> WornDepths:
 
 
 def middle_profiles(folder: Path, names: Iterable[str]) -> dict[str, tuple[Array, Array, Array]]:
-    """Places x ``(nx,)`` [mm] of each face, and worn depths ``(nx,)`` of its bodies in its middle.
+    """Return places x ``(nx,)`` and worn depths ``(nx,)`` of both bodies in mid-face [mm].
 
-    A line contact is its own middle section: two and three dimensions can be compared by it.
+    A line contact is its own middle section, so two and three dimensions can be compared.
     """
     profiles = {}
     for name, (grid, *depths) in worn_depths(folder, names).items():
@@ -82,7 +82,7 @@ def middle_profiles(folder: Path, names: Iterable[str]) -> dict[str, tuple[Array
 
 
 def middle_sections(folder: Path, names: Iterable[str]) -> dict[str, dict[str, float]]:
-    """Largest depth [mm] and worn area [mm²] of each body in the middle of each face."""
+    """Return the largest depth [mm] and worn area [mm²] of each body in mid-face."""
     sections = {}
     for name, (x, *profiles) in middle_profiles(folder, names).items():
         pitch = float(x[1] - x[0])
@@ -94,7 +94,7 @@ def middle_sections(folder: Path, names: Iterable[str]) -> dict[str, dict[str, f
 
 
 def middle_quantities(summary: Mapping[str, Any]) -> list[str]:
-    """Paths of the numbers of :func:`middle_sections` in a summary that has them."""
+    """Return the paths of the numbers of :func:`middle_sections` in a summary with them."""
     sections: Mapping[str, Mapping[str, float]] = summary.get(MIDDLE, {})
     return [
         f"{MIDDLE}.{name}.{key}"
@@ -105,9 +105,10 @@ def middle_quantities(summary: Mapping[str, Any]) -> list[str]:
 
 
 def profile_difference(coarse: WornDepths, fine: WornDepths) -> float | None:
-    """Largest difference of depth anywhere, over the largest depth of ``fine``; both bodies.
+    """Return the largest difference of worn depth relative to the largest depth of ``fine``.
 
-    None where the grids are not of one dimension.
+    Depths are those of both bodies together. The result is None if the grids have different
+    dimensions.
     """
     largest = 0.0
     for name, (grid, *depths) in coarse.items():
@@ -122,7 +123,7 @@ def profile_difference(coarse: WornDepths, fine: WornDepths) -> float | None:
 
 
 def _resampled(field: Any, grid: Grid, onto: Grid) -> Array:
-    """A field of one grid at the cells of another over the same face."""
+    """Return a field on one grid at the cells of another grid over the same face."""
     from scipy.interpolate import RegularGridInterpolator
 
     if grid.line:
@@ -140,7 +141,7 @@ def _measured(folder: Path, summary: Summary) -> Summary:
 
 
 def _apart(folder: Path, reference: Path, summary: Summary) -> dict[str, float]:
-    """Largest difference of worn depth anywhere to another run, over its largest depth."""
+    """Return the largest difference of worn depth from another run, over its largest depth."""
     names = interfaces(summary)
     difference = profile_difference(worn_depths(folder, names), worn_depths(reference, names))
     return {} if difference is None else {PROFILE: difference}

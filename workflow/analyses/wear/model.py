@@ -1,4 +1,4 @@
-"""A wear case as a model that runs without it."""
+"""Translation of a wear case into a model that runs without the case."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a wear run found, before any of it is written."""
+"""Outcome of a wear run, before any of it is written."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.models.contact import ContactEnd, FaceContact
 from workflow.models.loads import LoadSource
 
-# Order of the pressure at worn edges in the length of steps that go over increments to and fro: 4,
-# 8 and 16 implicit ones left 5.5, 1.9 and 0.75 % of it on a dovetail's flank, 2, 4 and 8 of second
-# order 12, 4.2 and 0.8 %.
+# Order of convergence of the pressure at worn edges in the length of forward and backward (Strang)
+# steps over increments: 4, 8 and 16 implicit ones had errors of 5.5, 1.9 and 0.75 % on a dovetail's
+# flank; 2, 4 and 8 of second order 12, 4.2 and 0.8 %.
 AT_EDGES = 1.5
-# Share of the pressed cells whose pressures tell how far the largest of them is off.
+# Share of the pressed cells whose pressures estimate the error of the largest one.
 HIGHEST = 0.1
-# Wear that has come to so little of all that has worn is an end state.
+# Share of all wear; once less than this is still to come, wear has reached an end state.
 STOPPED = 0.01
 
 
 @dataclass(frozen=True)
 class InterfaceOutcome:
-    """What a wear run found of one contact.
+    """Outcome of a wear run for one contact.
 
-    ``unworn`` are its loads before wear and ``first`` the contact of that cycle; ``state`` has its
-    surfaces at the end, and ``told`` tells a cycle on them. ``kinetics`` ``(j, 5)`` are those at
-    ``cycles`` ``(j,)``. ``finer`` gives both cycles in twice as many increments, None where nobody
-    knows the loads in between.
+    ``unworn`` are its loads before wear and ``first`` the contact of that cycle. ``state`` has its
+    surfaces at the end, and ``told`` returns a cycle on them. ``kinetics`` ``(j, 5)`` are those at
+    ``cycles`` ``(j,)``. ``finer`` returns both cycles in twice as many increments, or None where
+    the loads between increments are unknown.
     """
 
     stage: FaceContact
@@ -52,7 +52,7 @@ class InterfaceOutcome:
 
     @cached_property
     def regimes(self) -> dict[str, LinearRegime | None]:
-        """Linear regimes of depth and volume, both bodies together."""
+        """Linear regimes of depth and volume, sums of both bodies."""
         columns = {"depth": self.kinetics[:, :2], "volume": self.kinetics[:, 2:4]}
         return {
             name: linear_regime(self.cycles, values.sum(axis=1)) for name, values in columns.items()
@@ -60,10 +60,10 @@ class InterfaceOutcome:
 
     @property
     def stopped(self) -> float | None:
-        """Cycles after which wear had stopped; None where it goes on, or nothing has worn.
+        """Cycles after which wear has stopped; None if it goes on, or nothing has worn.
 
-        Depth and volume of both bodies are within :data:`STOPPED` of those at the end from then on,
-        for half of all cycles at least.
+        From then on, depth and volume of both bodies are within :data:`STOPPED` of their final
+        values, for at least half of all cycles.
         """
         worn = self.kinetics[:, :4]
         still = np.flatnonzero((worn < (1.0 - STOPPED) * worn[-1]).any(axis=1))
@@ -74,13 +74,13 @@ class InterfaceOutcome:
 
     @cached_property
     def carried(self) -> dict[str, LoadHistory]:
-        """Loads, unworn and worn, with what pressure carries where motions press."""
+        """Loads, unworn and worn, with the forces of the pressure where imposed motions press."""
         starts, worn = self.state.starts, np.zeros_like(self.first.pressure)
         for t, start in starts.items():
-            worn[t] = start.pressure  # that the last wear step has left
+            worn[t] = start.pressure  # of the last wear step
         still = [t for t in np.flatnonzero(self.state.loads.P > 0.0) if t not in starts]
         if still and self.stage.settings.drive.presses:
-            worn[still] = self.end.pressure[still]  # nothing has worn there
+            worn[still] = self.end.pressure[still]  # where nothing has worn
         return {
             "unworn": self.stage.carried(self.unworn.loads, self.first.pressure),
             "worn": self.stage.carried(self.state.loads, worn),
@@ -88,13 +88,13 @@ class InterfaceOutcome:
 
     @property
     def worn_area(self) -> float:
-        """Area that has worn by the end [mm²]."""
+        """Worn area at the end [mm²]."""
         worn = self.stage.on_grid(self.state).depth > 0.0
         return np.count_nonzero(worn) * self.stage.grid.cell_area
 
     @property
     def slip_per_cycle(self) -> float:
-        """Largest path of slip [mm] in an unworn cycle; of the half-space if loads have none."""
+        """Largest slip path [mm] in an unworn cycle; the half-space's if loads have no slip."""
         slip = self.unworn.slip
         if self.first.cycle and not slip.any():
             slip = np.stack([state.slip for state in self.first.cycle])
@@ -103,11 +103,11 @@ class InterfaceOutcome:
 
     @cached_property
     def step_error(self) -> dict[str, float] | None:
-        """What wear steps leave of depth, volume and pressure, relative; None where nobody knows.
+        """Relative error of depth, volume and pressure due to wear steps; None if it is unknown.
 
-        Of the pressure it is what steps of twice the length change of its peak
-        (:func:`peak_change`): over 2^p - 1, p being :data:`AT_EDGES`, but for implicit steps over
-        increments in turn, whose error is of first order.
+        That of the pressure is the change of its peak due to steps of twice the length
+        (:func:`peak_change`), divided by 2^p - 1 with p = :data:`AT_EDGES`. Implicit steps over
+        increments in turn have errors of first order, so that their change is not divided.
         """
         left, other = step_errors(self.state, self.stage.areas), self.ended.pressure_of_companion
         if left is None or other is None:
@@ -118,9 +118,10 @@ class InterfaceOutcome:
 
     @cached_property
     def increments_error(self) -> dict[str, float] | None:
-        """Error due to increments of depth and energy, over the first and the last cycle together.
+        """Error of depth and energy due to increments, over the first and the last cycle together.
 
-        By as many again where loads in between are known, of friction too; None where nobody knows.
+        It is measured with twice as many increments if the loads between increments, friction
+        included, are known, and estimated otherwise; None if it is unknown.
         """
         cycles = [self.begin, self.end]
         try:
@@ -133,7 +134,7 @@ class InterfaceOutcome:
     def border_error(self) -> dict[str, float] | None:
         """Relative error of depth and volume due to the border of the stick zone.
 
-        Of a half-space with its own friction; None where nobody knows.
+        It exists for a half-space with its own friction solution; None if it is unknown.
         """
         contact, cycles = self.stage.wearing(self.state), float(self.cycles[-1])
         try:
@@ -143,27 +144,27 @@ class InterfaceOutcome:
 
     @cached_property
     def begin(self) -> CycleTractions:
-        """The tractions of the unworn cycle."""
+        """Tractions of the unworn cycle."""
         return self.stage.unworn_tractions(self.unworn, self.first)
 
     @cached_property
     def end(self) -> CycleTractions:
-        """The tractions of a cycle at the end."""
+        """Tractions of a cycle at the end."""
         return self.ended.tractions
 
     @cached_property
     def ended(self) -> ContactEnd:
-        """A cycle at the end, waited for."""
+        """Cycle at the end; reading it waits for the result."""
         return self.told()
 
 
 def peak_change(pressure: Array, other: Array, at_rest: bool) -> float:
-    """Return how far the peak of ``pressure`` ``(t, nx, ny)`` differs in an ``other``, relative.
+    """Return how far the peak of ``pressure`` ``(t, nx, ny)`` differs in ``other``, relative.
 
-    It is looked for in the increment of the peak, among the :data:`HIGHEST` share of the pressed
-    cells of both, sorted by size: the two peaks alone may be equal by chance, and a rim that one
-    contact has reached and the other has not is no change of the peak. Surfaces ``at_rest`` keep
-    its place, where it counts as well.
+    In the increment of the peak, the :data:`HIGHEST` share of the pressed cells of both fields are
+    compared, sorted by size: the peaks alone may be equal by chance, and a rim that only one
+    contact has reached is no change of the peak. For surfaces ``at_rest``, the change at the place
+    of the peak counts as well.
     """
     peak, place = float(pressure.max()), int(pressure.argmax())
     if peak <= 0.0:
@@ -177,7 +178,7 @@ def peak_change(pressure: Array, other: Array, at_rest: bool) -> float:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Everything a wear run found: its ``state`` at the end, and the contact of every interface."""
+    """Outcome of a wear run: its ``state`` at the end, and the contact of every interface."""
 
     case: WearCase
     source: LoadSource

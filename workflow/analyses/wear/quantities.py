@@ -1,4 +1,4 @@
-"""Main results of a wear run: what every contact has lost, and the pressures and stresses there."""
+"""Main results of a wear run: wear of every contact, and pressures and stresses there."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from workflow.shell.dataset import unit_in
 from workflow.shell.quantities import CurvesOf, Quantity
 from workflow.shell.summary import estimate, number_at, told
 
-# Estimated errors are totals of the error budget.
+# Source of estimated errors in the report: totals of the error budget.
 BUDGET = "all parts of the error budget below"
 LOOP_ERROR = "grid and increments of the loop; not what wear steps leave of the surfaces"
 STRUCTURE = "structure"
-# Of elements, as gmsh's gamma.
+# Description of element quality, defined as gmsh's gamma.
 QUALITY = "inscribed over circumscribed radius, 1: regular"
-# Tangential forces below this share of the normal one are those of a mesh that is not symmetric.
+# Tangential forces below this share of the normal force are due to asymmetry of the mesh.
 LITTLE = 0.01
-# And below this one rounding.
+# Forces below this share of another force are rounding.
 ROUNDING = 1e-9
-# Fretting parameters: unit and name.
+# Unit and name of the fretting parameters.
 PARAMETERS = {
     "cracking_parameter": ("N^2/mm^3", "Ruiz's cracking parameter"),
     "smith_watson_topper": ("MPa", "Smith-Watson-Topper parameter"),
     "findley": ("MPa", "Findley's parameter"),
 }
-# What runs are compared by, beside the numbers.
+# Curves by which runs are compared, in addition to the numbers.
 CURVES = (
     CurvesOf("depth worn from body 1", "kinetics/cycles", "kinetics/*/depth_1", ("1", "mm")),
     CurvesOf("depth worn from body 2", "kinetics/cycles", "kinetics/*/depth_2", ("1", "mm")),
@@ -57,7 +57,7 @@ CURVES = (
 
 
 def main_results(case: WearCase, summary: Summary) -> list[Quantity]:
-    """Of every interface, and the largest stresses of the structure if there is one."""
+    """Return the results of every interface, bolt and body of the structure."""
     quantities = [
         quantity
         for name in interfaces(summary)
@@ -67,12 +67,12 @@ def main_results(case: WearCase, summary: Summary) -> list[Quantity]:
 
 
 def named(body: str) -> str:
-    """A body in words: names of bodies are keys."""
+    """Return a body's name as words: names of bodies are keys."""
     return body.replace("_", " ")
 
 
 def _worn(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]:
-    """Wear, pressures and loads of an interface."""
+    """Yield wear, pressures and loads of an interface."""
     line = summary["per_length"]
     of = partial(Quantity, name)
     results = "depth", "volume", "peak_pressure", "worn_peak_pressure"
@@ -109,13 +109,13 @@ def _worn(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]:
 
 
 def _is_there(summary: Summary, path: str, beside: str) -> bool:
-    """Whether a force is more than rounding beside another."""
+    """Return whether a force is more than rounding compared with another."""
     force, other = (number_at(summary, place) for place in (path, beside))
     return force is not None and abs(force) > ROUNDING * abs(other or 0.0)
 
 
 def _load_ranges(summary: Summary, name: str) -> Iterator[Quantity]:
-    """What tangential forces reach in a cycle, each with its increment."""
+    """Yield the ranges of tangential forces in a cycle, with their increments."""
     unit = unit_in(summary["per_length"], "N")
     for moment in MOMENTS:
         ranges = summary[name].get("load_range", {}).get(moment, {})
@@ -133,7 +133,7 @@ def _load_ranges(summary: Summary, name: str) -> Iterator[Quantity]:
 
 
 def _acts(ranges: Summary, load: str) -> bool:
-    """Whether a force is more than a little beside the normal one."""
+    """Return whether a force is not small compared with the normal force."""
     if load not in ranges:
         return False
     reached = max(abs(ranges[load][end]) for end in ("least", "largest"))
@@ -141,7 +141,7 @@ def _acts(ranges: Summary, load: str) -> bool:
 
 
 def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]:
-    """Tangential loops, stress and fretting parameters under an interface."""
+    """Yield tangential loops, stress and fretting parameters under an interface."""
     of, per = partial(Quantity, name), "/mm" if summary["per_length"] else ""
     for moment in MOMENTS:
         path = f"{name}.loops.{moment}"
@@ -164,20 +164,20 @@ def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]
 
 
 def _of_loop(summary: Summary, path: str, key: str) -> dict[str, Any]:
-    """The estimated error of a value of a loop."""
+    """Return the estimated error of a value of a loop."""
     value, error = (number_at(summary, f"{path}.{name}") for name in (key, f"{key}_error"))
     return {"error": error / value, "error_of": LOOP_ERROR} if value and error is not None else {}
 
 
 def _budgeted(summary: Summary, name: str, result: str) -> dict[str, Any]:
-    """The total of the error budget of a result, and where its parts are."""
+    """Return the total error of a result in the error budget, and the path of its parts."""
     path = f"{name}.error.{result}"
     known = estimate(summary, f"{path}.total", BUDGET)
     return known | {"budget": (RESULTS[result], path)} if known else {}
 
 
 def _of_bolts(summary: Summary) -> Iterator[Quantity]:
-    """Of every bolt its tension at peak load, and how much of it wear has cost."""
+    """Yield the tension of every bolt at peak load, and the share lost by wear."""
     unit = unit_in(summary["per_length"], "N")
     for bolt in summary.get(STRUCTURE, {}).get("bolts", {}):
         of, path = partial(Quantity, named(bolt)), f"{STRUCTURE}.bolts.{bolt}"
@@ -189,8 +189,8 @@ def _of_bolts(summary: Summary) -> Iterator[Quantity]:
 
 
 def _of_structure(summary: Summary) -> Iterator[Quantity]:
-    """Of every body the largest stress off the contact faces, and the elements it is told by."""
-    # By the names that a mesh file gives them.
+    """Yield the largest stress of every body off the contact faces, and its elements."""
+    # Bodies have the names of the mesh file.
     for body in summary.get(STRUCTURE, {}).get("mesh", {}):
         of, mesh = partial(Quantity, named(body)), f"{STRUCTURE}.mesh.{body}"
         for moment in MOMENTS:
@@ -204,7 +204,7 @@ def _of_structure(summary: Summary) -> Iterator[Quantity]:
 
 
 def _left_by_mesh(summary: Summary, path: str) -> dict[str, Any]:
-    """The error of a stress; none where it grows with every refinement."""
+    """Return the error of a stress, or a note if the stress grows with every refinement."""
     error = number_at(summary, f"{path}.error")
     if error is not None and error >= 1.0:
         return {"where": "grows as the mesh is refined"}

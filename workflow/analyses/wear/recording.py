@@ -1,6 +1,6 @@
-"""What looks on while a wear run goes: its log with times and warnings, and the files of its jumps.
+"""Observers of a wear run: its log with times and warnings, and the files of its jumps.
 
-The coupled loop (:mod:`wear.coupled`) knows nothing of them.
+The coupled loop (:mod:`wear.coupled`) calls them but does not depend on them.
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ from workflow.shell.store import write_arrays
 
 @contextmanager
 def reported_stage(reporter: Reporter, working: object, name: str, of: str) -> Iterator[None]:
-    """A stage in which what is ``working`` tells how many ``of`` its things are done.
+    """Run a stage in which the ``working`` object reports how many items are done.
 
-    Of what cannot be heard, as other sources of loads, nothing takes long.
+    ``of`` names the items. Objects that report no progress, such as other sources of loads, have no
+    long computations.
     """
     with reporter.stage(name, of) as told, ExitStack() as stack:
         if isinstance(working, ReportsProgress):
@@ -41,7 +42,7 @@ def reported_stage(reporter: Reporter, working: object, name: str, of: str) -> I
 
 @dataclass(frozen=True)
 class RunLog(Observer):
-    """Times the parts of the loop, and says how far it has got and what to beware of."""
+    """Log of the loop: times of its parts, progress, and warnings."""
 
     run: Run[WearCase]
     contacts: FaceContacts
@@ -72,12 +73,11 @@ class RunLog(Observer):
 
 @dataclass
 class Recorder(Observer):
-    """Writes the fields of every jump, and now and then the state that the next one starts from.
+    """Writer of the fields of every jump and, from time to time, of the state for a restart.
 
-    Fields are those at ``peak`` load. ``jumps`` are the digests of their files, those of the run
-    that this one goes on from to begin with. States take the share of the time that
-    :mod:`workflow.shell.steps` lets them; the last one is written whatever ends the march, within
-    :meth:`kept`.
+    Fields are those at ``peak`` load. ``jumps`` are the digests of the jump files, starting with
+    those of a resumed run. :mod:`workflow.shell.steps` limits the share of time for writing states;
+    the last state is written whatever ends the march, within :meth:`kept`.
     """
 
     run: Run[WearCase]
@@ -89,12 +89,12 @@ class Recorder(Observer):
 
     def __post_init__(self) -> None:
         self._unsaved: CoupledState | None = None
-        # When the last state was written, and how long that took [s].
+        # Time when the last state was written, and how long that took [s].
         self._saved, self._cost = time.perf_counter(), steps.FIRST_SAVE
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """A march whose last state is written, unless the disk is what ends it."""
+        """March within this context; its last state is written unless a disk error ends it."""
         try:
             yield
         except OSError:
@@ -112,7 +112,7 @@ class Recorder(Observer):
         self.keep(after)
 
     def keep(self, state: CoupledState) -> None:
-        """Write the fields of this jump, and then the state if that is due."""
+        """Write the fields of this jump, then the state if it is due."""
         loops = self._loops(state)
         with self.run.reporter.stage("checkpoints"):
             recorded = self.contacts.fields(state.interfaces, self.peak)
@@ -132,7 +132,7 @@ class Recorder(Observer):
             self._save()
 
     def _save(self) -> None:
-        """Write the state of the last jump recorded, if that is not written yet."""
+        """Write the state of the last recorded jump, unless it is written already."""
         if self._unsaved is None:
             return
         begun = time.perf_counter()
@@ -142,7 +142,7 @@ class Recorder(Observer):
         self._cost = self._saved - begun
 
     def _loops(self, state: CoupledState) -> dict[str, Array]:
-        """Tangential loops on the present surfaces, where they are due."""
+        """Return the tangential loops on the present surfaces, if they are due."""
         loops = self.run.case.loops.described()
         if loops is None or not loops.due(state.jump, self.settings.ended(state)):
             return {}

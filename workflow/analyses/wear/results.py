@@ -1,4 +1,4 @@
-"""What a finished wear run leaves: results, summary, ParaView files, figures."""
+"""Output of a finished wear run: results, summary, ParaView files, figures."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ from workflow.shell.results import Along, On, ResultsWriter, run_results
 from workflow.shell.store import read_arrays
 from workflow.shell.summary import finish
 
-# What the file of a jump has of each interface.
+# Fields of each interface in the file of a jump.
 JUMP_FIELDS = {"surfaces": ("body_1", "body_2"), "contact": ("pressure", "shear", "slip")}
-# What the kinetics have of each linear regime; not numbers where there is none.
+# Attributes of the kinetics for each linear regime; nan if there is none.
 REGIME_ATTRIBUTES = {"linear_from": "start", "rate": "rate", "trend": "trend", "scatter": "scatter"}
 
-# Depths up to here [mm] are rounding of contacts that stick.
+# Depths up to this [mm] are rounding of contacts that stick.
 NOTHING = 1e-10
 
 
@@ -65,7 +65,8 @@ NOTHING = 1e-10
 class PeakHistory:
     """The contact at peak load after every jump, unworn first.
 
-    ``area`` in contact [mm²], its ``width`` along x [mm] and largest ``pressure`` [MPa].
+    ``area`` is the contact area [mm²], ``width`` its extent along x [mm] and ``pressure`` the
+    largest pressure [MPa].
     """
 
     area: list[float]
@@ -73,7 +74,7 @@ class PeakHistory:
     pressure: list[float]
 
     def summary(self) -> dict[str, Any]:
-        """The first and last pressure and width, and the last area."""
+        """Return the first and last pressure and width, and the last area."""
         pressures = {"unworn": self.pressure[0], "worn": self.pressure[-1]}
         widths = {"unworn": self.width[0], "worn": self.width[-1]}
         return {"peak_pressure": pressures, "contact_width": widths, "area": self.area[-1]}
@@ -82,7 +83,7 @@ class PeakHistory:
 def write_output(outcome: Outcome, lives: Begun, run: Run[WearCase]) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished.
 
-    ``lives`` are those of companions, which have begun already.
+    ``lives`` returns the results of the probe runs, which have started already.
     """
     case, source, state = outcome.case, outcome.source, outcome.state
     folder, reporter = run.folder, run.reporter
@@ -124,7 +125,7 @@ def write_output(outcome: Outcome, lives: Begun, run: Run[WearCase]) -> None:
 def _stresses(
     outcome: Outcome, structure: WornStructure | None, reporter: Reporter, progress: Progress
 ) -> list[InterfaceStress]:
-    """Stress under every contact as the case asks for it; empty if it does not."""
+    """Return the stress under every contact; empty if the case does not request it."""
     if not outcome.case.stress.wanted:
         return []
     cycles = []
@@ -152,7 +153,7 @@ def _write_results(
     budget: Budget,
     run: Run[WearCase],
 ) -> tuple[dict[str, PeakHistory], Contents]:
-    """Write ``results.h5``; what the jumps recorded, by interface, and what is there."""
+    """Write ``results.h5``; return the recorded peak histories by interface, and its contents."""
     case, source = outcome.case, outcome.source
     attributes = {
         "friction": case.friction.at(0.0),
@@ -212,7 +213,7 @@ def _write_results(
 
 
 def _holding_moments(contact: InterfaceOutcome) -> dict[str, Dataset]:
-    """Moments ``(t,)`` that hold the tilt, where it is held."""
+    """Return the moments ``(t,)`` that hold the tilt, if it is held."""
     if contact.stage.settings.drive.tilt == "free":
         return {}
     return {
@@ -225,10 +226,10 @@ def _holding_moments(contact: InterfaceOutcome) -> dict[str, Dataset]:
 
 
 def _write_coarse(writer: ResultsWriter, contact: InterfaceOutcome, peak: int) -> bool:
-    """The peak load on a grid as coarse as the mesh, to compare with; whether there is one.
+    """Write the peak load on a grid as coarse as the mesh; return whether it exists.
 
-    None where the moments put that load outside the middles of the coarse cells: no reason to lose
-    the run.
+    It does not exist if the moments put the load outside the centres of the coarse cells, which is
+    no reason to end the run.
     """
     stage = contact.stage
     try:
@@ -245,7 +246,7 @@ def _write_coarse(writer: ResultsWriter, contact: InterfaceOutcome, peak: int) -
 def _write_jumps(
     writer: ResultsWriter, outcome: Outcome, folder: OutputFolder
 ) -> dict[str, PeakHistory]:
-    """Copy surfaces and contacts of all jumps; what they come to, by interface."""
+    """Copy surfaces and contacts of all jumps; return the peak histories by interface."""
     recorded = {contact.stage.name: PeakHistory([], [], []) for contact in outcome.interfaces}
     grids = [contact.stage.grid for contact in outcome.interfaces]
     for jump in range(outcome.state.jump + 1):
@@ -267,7 +268,7 @@ def _write_jumps(
 
 
 def _extent(pressure: Array) -> int:
-    """Cells along x from the first to the last that is pressed."""
+    """Return the number of cells along x from the first to the last pressed one."""
     pressed = np.flatnonzero((pressure > 0.0).any(axis=1))
     return int(np.ptp(pressed)) + 1 if pressed.size else 0
 
@@ -355,7 +356,7 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
 
 
 def _tilt_summary(contact: InterfaceOutcome) -> dict[str, Any]:
-    """Whether the tilt is held, and the largest moments of a cycle that hold it [N mm]."""
+    """Return whether the tilt is held, and the largest moments that hold it [N mm]."""
     tilt = contact.stage.settings.drive.tilt
     if tilt == "free":
         return {"tilt": tilt}
@@ -365,7 +366,7 @@ def _tilt_summary(contact: InterfaceOutcome) -> dict[str, Any]:
 
 
 def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
-    """A linear regime, and where it leads with its uncertainty."""
+    """Return a linear regime with its extrapolation and uncertainty."""
     cycles = np.array(EXTRAPOLATION * regime.last_cycles)
     return vars(regime) | {
         "extrapolated": {
@@ -377,7 +378,7 @@ def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
 
 
 def _lines(outcome: Outcome, summary: dict[str, Any], budget: Budget) -> Iterator[str]:
-    """The end of the run in a few lines."""
+    """Yield the results of the run in a few lines."""
     yield f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps"
     name_1, name_2 = outcome.case.bodies
     unit = "mm^3/mm" if outcome.source.line else "mm^3"

@@ -1,4 +1,4 @@
-"""A wear case, the main road: structure, contact, wear, back to the structure, output."""
+"""Run of a wear case: structure, contact, wear, updated loads, output."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ from workflow.shell.cache import DiskStore
 from workflow.shell.processes import Workers
 from workflow.shell.reporter import Reporter
 
-# Jumps, more than which are warned of.
+# Number of jumps above which the run warns.
 MANY_JUMPS = 300
 
 
 def run_wear(run: Run[WearCase]) -> None:
-    """Run a wear case to its end, from the last state that was kept if it is to resume."""
+    """Run a wear case to its end, from the last stored state if it is to resume."""
     folder = run.folder
     report_choice(run.choice, run.reporter, again=run.resume)
     try:
@@ -76,13 +76,13 @@ def run_wear(run: Run[WearCase]) -> None:
 
 
 def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
-    """The run up to its end, without its files; and the lives of companions beside it.
+    """Return the outcome of the run before its files are written, and its probe runs.
 
-    What its contacts find last they may find while the structure is stressed, ``working`` until
-    they have told.
+    The contacts may solve their last cycles while the stress of the structure is computed;
+    ``working`` keeps the workers until these results are in.
     """
     case, reporter = run.case, run.reporter
-    # First, so that a state that cannot be gone on from is told before anything is computed.
+    # This comes first, so that an unusable state is reported before anything is computed.
     kept = checkpoint.restored(run, run.kept) if run.kept else None
     for doubt in case.surface_doubts():
         reporter.warn(doubt)
@@ -121,11 +121,14 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
 def _told_once(
     answers: Callable[[], list[ContactEnd]], working: ExitStack, contacts: int
 ) -> list[Callable[[], ContactEnd]]:
-    """What tells each of the ends, whatever threads ask; with the first they are all told."""
+    """Return one function per contact for its last cycle, safe to call from any thread.
+
+    The first call waits for the results of all contacts and then ends the workers.
+    """
 
     @cache
     def told() -> list[ContactEnd]:
-        with working:  # until then
+        with working:  # keeps the workers until then
             return answers()
 
     def tell(number: int) -> ContactEnd:
@@ -143,14 +146,14 @@ def _contacts(
     faces: Sequence[ContactFace],
     workers: Workers,
 ) -> FaceContacts:
-    """Return what wears: half-spaces in worker processes or here, or nodes of the structure."""
+    """Return the contacts: half-spaces in worker processes or here, or nodes of the structure."""
     if _worn_apart(case, source):
         return ContactProcesses([face_contact(case, face) for face in faces], workers)
     return model.face_contacts(source)
 
 
 def _worn_apart(case: WearCase, source: LoadSource) -> bool:
-    """Whether contacts wear in workers: a line's pressures take less time than these to start."""
+    """Return whether contacts wear in workers; line contacts are faster than starting workers."""
     method = case.contact.method
     return method == "full" or (method == "normal" and not source.line)
 
@@ -163,7 +166,7 @@ def _march(
     unworn: Sequence[FaceLoads],
     kept: CoupledState | None,
 ) -> tuple[CoupledState, list[FirstContact]]:
-    """The state at the end, from ``kept`` or from unworn surfaces; and the first contact."""
+    """Return the final state, from ``kept`` or from unworn surfaces, and the first contacts."""
     case, reporter, settings = run.case, run.reporter, model.settings(source)
     jumps = list(run.kept.jumps) if run.kept else []
     recorder = Recorder(run, settings, source.peak, contacts, jumps, source)
@@ -186,7 +189,7 @@ def _march(
 def _check_structure(
     case: FiniteElementCase, structure: StructureLoads, reporter: Reporter
 ) -> None:
-    """Warnings about the structure, and the check of its nonlinearity."""
+    """Report warnings about the structure, and check its nonlinearity if requested."""
     reporter.log(f"loads: {marched(structure.unworn_cycle)}")
     warn_of_structure(case, structure, reporter)
     if case.friction_evolves and case.recoupling.resultants == "constant":
@@ -201,7 +204,7 @@ def _check_structure(
 
 
 def meshed_faces(case: WearCase, source: LoadSource, reporter: Reporter) -> tuple[ContactFace, ...]:
-    """The faces of a source of loads, once it is known that the memory is enough for the run."""
+    """Return the faces of a source of loads after checking the memory that the run needs."""
     with reporter.stage("mesh"):
         faces = source.faces
     if isinstance(source, StructureLoads):

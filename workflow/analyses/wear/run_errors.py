@@ -1,4 +1,4 @@
-"""Errors that a wear run knows of, warned of where they are more than was asked for."""
+"""Warnings about estimated errors of a wear run that exceed the requested accuracy."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from workflow.analyses.wear.structure import SETTINGS
 from workflow.analyses.wear.structures import structure_of
 from workflow.shell.reporter import Reporter
 
-# What steps may leave of the peak pressure: more may be edges that only long steps wear.
+# Largest error of the peak pressure due to steps without a warning.
 PEAK = 0.1
-# Increments of a cycle of surfaces that move over each other, fewer than which leave the worn peak
-# pressure a fifth too large and more: on a cylinder over a third of its scar 4, 8, 16 and 32 left
-# 110, 60, 20 and 10 %.
+# Fewest increments of a cycle with moving surfaces. With fewer, the worn peak pressure is too
+# large: on a cylinder that moves over a third of its scar, 4, 8, 16 and 32 increments caused errors
+# of 110, 60, 20 and 10 %.
 FEW_INCREMENTS = 32
 
 
-# How many times shorter steps and smaller drifts to take where they leave too much: what those of
-# first order leave falls to a quarter. The length of automatic steps goes with about the root of
-# their tolerance.
+# Factors by which advice shortens steps and drifts, and tightens tolerances. Errors of first order
+# fall to a quarter; the length of automatic steps is about proportional to the root of their
+# tolerance.
 SHORTER, STRICTER = 4.0, 10.0
 
 
@@ -36,10 +36,10 @@ def warn_of_errors(
     drift: float,
     reporter: Reporter,
 ) -> None:
-    """Results farther off than the case's accuracy, and steps than was asked for.
+    """Warn of results beyond the case's accuracy, and of steps beyond their tolerance.
 
-    ``drift`` is the largest that was found after a jump. And few increments of surfaces that move
-    over each other, which no estimate knows of.
+    ``drift`` is the largest one found after a jump. Too few increments of surfaces that move over
+    each other cause a warning as well, because no estimate includes their error.
     """
     for contact in contacts:
         name, state, shorter = contact.stage.name, contact.state, shorter_steps(case.wear, contact)
@@ -60,9 +60,9 @@ def warn_of_errors(
 def shorter_steps(wear: Duration, contact: InterfaceOutcome) -> str:
     """Return the setting that makes the steps of a finished run shorter.
 
-    Automatic ones follow their tolerance. On surfaces that move over each other they are shorter
-    than it asks for (:meth:`wear.steps.stepping.WearingContact.comparable_cycles`), so that it does
-    nothing, and those of second order leave edges less high.
+    Automatic steps follow their tolerance. On moving surfaces they are shorter than it requires
+    (:meth:`wear.steps.stepping.WearingContact.comparable_cycles`), so that it has no effect; steps
+    of second order make lower edges there.
     """
     step, moving = wear.step, len(contact.state.paths) > 0
     if step.depth is not None:
@@ -79,9 +79,9 @@ def shorter_steps(wear: Duration, contact: InterfaceOutcome) -> str:
 
 
 def _of_link_and_coupling(case: WearCase, shorter: str, drift: float) -> dict[str, str]:
-    """Return the settings, not in use yet, that make the errors of link and coupling smaller.
+    """Return the settings, not in use yet, that reduce the errors of link and coupling.
 
-    A smaller ``coupling.drift`` does nothing above the largest ``drift`` that was found.
+    A ``coupling.drift`` above the largest ``drift`` found would have no effect.
     """
     coupling, every = case.recoupling, "coupling.resultants: every"
     reached = min(coupling.drift, drift) / SHORTER

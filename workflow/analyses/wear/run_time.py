@@ -1,4 +1,4 @@
-"""How long a wear run takes: its structure, its contacts' steps, and what is found at the end."""
+"""Estimate of the time of a wear run: its structure, the wear steps, and the final output."""
 
 from __future__ import annotations
 
@@ -17,52 +17,52 @@ from workflow.shell.run_time import (
     solves,
 )
 
-# Automatic steps of 1 %, on pressures alone and with the half-space's own friction; steps by depth
-# or volume; jumps of explicit steps that are recorded. Only the first holds for every case.
+# Numbers of automatic steps at 1 %, for pressures alone and for the half-space's friction; of steps
+# by depth or volume; and of recorded jumps of explicit steps. Only the first holds for every case.
 AUTOMATIC, AUTOMATIC_FULL, BY_SIZE, RECORDED = 15, 40, 30, 10
-# Why the number of steps is unknown.
+# Reason for an unknown number of steps.
 UNKNOWN = "how many jumps there are depends on {}, and is reported as the run goes"
 STICKING = "how far wear moves the zone that sticks"
-# What is written after a jump [s].
+# Time to write a jump [s].
 JUMP = 0.02
-# Contact problems of an increment that dissipates in a step: of each kind.
+# Contact problems per dissipating increment and step, by kind of step.
 PROBLEMS = {"explicit": 1, "implicit": 1, "second_order": 4}
-# Of the increments of a structure's cycle, those that dissipate.
+# Share of the increments of a structure's cycle that dissipate.
 DISSIPATING = 0.6
-# A way [mm] that contacts of structures slip in a cycle.
+# Typical slip path [mm] of a structure's contacts in a cycle.
 SLIP = 0.03
-# Longest stable explicit step, of the pitch over E* times the wear per pressure
+# Longest stable explicit step, relative to pitch over E* times the wear per pressure
 # (wear.steps.stepping).
 STABLE = 1.16
-# Iterations of friction in the structure in an increment, each entry of its dense matrix in one of
-# them; and the same of its inverse [s].
+# Friction iterations of the structure per increment; time per entry of its dense matrix in an
+# iteration, and in its inversion [s].
 ITERATIONS, ENTRY, INVERSE = 24, 5e-10, 1e-10
 # Cycles until that of the structure is closed.
 CYCLES = 2
-# Those in a step of finite elements alone.
+# Structural cycles per wear step where nodes wear.
 CYCLES_IN_A_STEP = 5
-# Branches of a tangential loop that are marched until it is closed, each problem soon solved.
+# Branches of a tangential loop until it is closed; each problem is solved quickly.
 BRANCHES = 4
-# Stress under a contact, of a cell in an increment: on a face, by a search for the worst plane, and
-# what a structure carries past it.
+# Time of the stress under a contact per cell and increment [s], the factor for a search for the
+# worst plane, and the time of the stress that a structure carries past the contact.
 STRESS, SEARCHED, CARRIED = 1.2e-6, 10.0, 1e-6
-# Lives beside the run that tell what mesh, grid and coupling leave: how many, their steps, and
-# their cells at most; mesh and factors of their structures, and an iteration of friction in the
-# plane [s].
+# Probe runs in a worker process for the errors of mesh, grid and coupling: their number, steps and
+# largest number of cells per axis; time of mesh and factors of their structures, and of a friction
+# iteration in the plane [s].
 LIVES, LIFE_STEPS, LIFE_CELLS = 4, 6, 64
 PLANE, PLANE_ITERATION = 0.5, 1e-4
-# Stress and mesh of the structure at the end, in sparse factors; figures and files of fields [s].
+# Time of stress and mesh of the structure at the end, in sparse factors; of figures and files [s].
 WORN, PICTURES = 2.0, 6.0
 
 
 @dataclass(frozen=True)
 class Extent:
-    """What a structure lays on its contacts: ``increments`` of a cycle, on so many ``faces``.
+    """Size of a structure's loads: ``increments`` of a cycle on a number of ``faces``.
 
     ``nodes`` are those of both bodies and ``interface_nodes`` those of all faces, 0 without finite
-    elements. In a cycle the bodies pass a ``path`` [mm] over each other; ``dissipating`` is the
-    share of its increments in which they slide. Of a ``section`` in the plane, which stands for the
-    structure in short lives beside the run, it is the same.
+    elements. In a cycle the bodies slip by ``path`` [mm]; ``dissipating`` is the share of its
+    increments in which they slide. ``section`` is the extent of the plane section that represents
+    the structure in probe runs.
     """
 
     increments: int
@@ -76,9 +76,9 @@ class Extent:
 
 @dataclass(frozen=True)
 class Steps:
-    """Wear steps of a run and its ``jumps``, and why they are ``unknown``, if they are.
+    """Wear steps of a run, its ``jumps``, and the reason if their number is ``unknown``.
 
-    Those that are unknown have the numbers of a common case in their place.
+    Unknown numbers are replaced by those of a typical case.
     """
 
     count: float
@@ -87,7 +87,7 @@ class Steps:
 
 
 def run_time(case: WearCase, extent: Extent) -> RunTime:
-    """Of a wear case with a structure of this extent."""
+    """Return the estimated time of a wear case with a structure of this extent."""
     plane = getattr(case.structure, "dimension", 3) == 2 or case.contact.grid[1] == 1
     grids = [terms.grid[:1] if plane else terms.grid for terms in case.every_terms]
     cells = sum(map(prod, grids)) // len(grids)
@@ -104,7 +104,8 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
         worn += solves(steps * extent.increments, cells, FRICTIONAL)
     if case.loops.wanted:
         increments = jumps * BRANCHES * case.loops.increments
-        # And a loop of half as many cells along each side and increments, for its errors.
+        # The errors of a loop need a second one, with half the cells per side and half the
+        # increments.
         worn += solves(increments, cells, NORMAL) + solves(increments // 2, cells // 4, NORMAL)
     if case.contact.method == "nodes":
         begun, worn = 0.0, steps * CYCLES_IN_A_STEP * _structural_cycle(extent)
@@ -119,11 +120,11 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
 
 
 def steps_of(case: WearCase, extent: Extent) -> Steps:
-    """Return the wear steps of a case, counted where its settings tell their number.
+    """Return the wear steps of a case, counted where its settings determine their number.
 
     The number is unknown where a step wears a given depth or volume, unless the run stops at a
     given one, and where automatic steps follow the border of a zone that sticks: a cylinder on 512
-    strips took 60 jumps to its end state, other cases of the same tolerance take 20.
+    strips took 60 jumps to its end state, other cases with the same tolerance take 20.
     """
     wear, step = case.wear, case.wear.step
     if step.cycles is not None:
@@ -145,7 +146,7 @@ def steps_of(case: WearCase, extent: Extent) -> Steps:
 
 
 def _stable(case: WearCase, extent: Extent) -> float:
-    """About the longest stable explicit step [cycles]."""
+    """Return an estimate of the longest stable explicit step [cycles]."""
     bodies = [case.material(number) for number in (1, 2)]
     compliance = sum((1.0 - body.poisson**2) / body.young for body in bodies)
     worn = 0.0
@@ -159,17 +160,17 @@ def _stable(case: WearCase, extent: Extent) -> float:
 
 
 def _condensation(extent: Extent) -> float:
-    """Of the structure onto its interfaces [s]."""
+    """Return the time of condensing the structure onto its interfaces [s]."""
     return factors(extent.nodes) + INVERSE * (3.0 * extent.interface_nodes) ** 3
 
 
 def _structural_cycle(extent: Extent) -> float:
-    """Of a cycle of the structure with friction [s]."""
+    """Return the time of a cycle of the structure with friction [s]."""
     return extent.increments * ITERATIONS * ENTRY * (3.0 * extent.interface_nodes) ** 2
 
 
 def _stress(case: WearCase, extent: Extent, cells: int) -> float:
-    """Under all contacts, unworn and worn [s]."""
+    """Return the time of the stress under all contacts, unworn and worn [s]."""
     life = case.stress.life.parameter
     if life == "none":
         return 0.0
@@ -179,7 +180,7 @@ def _stress(case: WearCase, extent: Extent, cells: int) -> float:
 
 
 def _lives(case: WearCase, extent: Extent, plane: bool) -> float:
-    """Of short lives for the error budget, one of them on a mesh of half the size [s]."""
+    """Return the time of probe runs for the error budget, one of them on a finer mesh [s]."""
     if case.error_budget == "known" or case.contact.method == "nodes":
         return 0.0
     plane, life = plane or extent.section is not None, extent.section or extent
@@ -192,6 +193,6 @@ def _lives(case: WearCase, extent: Extent, plane: bool) -> float:
         return contacts
     finer = replace(life, interface_nodes=2.0 * life.interface_nodes)
     own, other = (LIFE_STEPS / 2 * _structural_cycle(mesh) for mesh in (life, finer))
-    # The others have loads that do not follow.
+    # In the other probe runs the loads stay constant.
     iterated = LIFE_STEPS * life.increments * ITERATIONS * PLANE_ITERATION
     return contacts + own + other + 2.0 * PLANE + iterated

@@ -1,4 +1,4 @@
-"""A kind of structure that loads contacts, as the wear analysis knows it."""
+"""A kind of structure that loads contacts, with the functions that the wear analysis needs."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 
-# Spectra and iterates alive during a contact solve, per cell.
+# Numbers per cell that are held during a contact solve, for spectra and iterates.
 SPECTRA = 300
-# Dense interface matrices alive at once while a joint is condensed.
+# Number of dense interface matrices that are held while a joint is condensed.
 DENSE_MATRICES = 6
 
-# What makes each part of the error of a run smaller; that of steps, and of loads that follow late,
-# depends on what they are (workflow.analyses.wear.run_errors).
+# Setting that reduces each part of the error of a run. Those for steps and delayed loads depend on
+# the case (workflow.analyses.wear.run_errors).
 SETTINGS = {
     "link": "the mesh of the contact faces",
     "mesh": "the mesh of the structure",
@@ -45,11 +45,11 @@ def memory(
     remedy: str = "lower contact.grid",
     matrices: int = DENSE_MATRICES,
 ) -> Memory:
-    """Of the contacts, and of a structure condensed onto its interfaces.
+    """Return the memory of the contacts and of a structure condensed onto its interfaces.
 
-    The structure has so many nodes, and its interfaces so many, once they are known; numbers
-    ``kept`` per cell of the grid are those of one contact at a time unless given; so many dense
-    ``matrices`` of the interfaces are alive at once.
+    ``nodes`` and ``interface_nodes`` are 0 while they are unknown. ``kept`` is the count of numbers
+    per cell of the grid, by default that of one contact at a time; ``matrices`` is the number of
+    dense interface matrices held at once.
     """
     dense = matrices * (3 * interface_nodes) ** 2
     cells = max(prod(terms.grid) for terms in case.every_terms)
@@ -58,9 +58,9 @@ def memory(
 
 @dataclass(frozen=True)
 class Finer(Generic[AnyWearCase]):
-    """A finer mesh, to tell what that of a case leaves: so large a ``share`` of the difference.
+    """A finer mesh for the error due to that of a case, which is ``share`` times the difference.
 
-    ``mesh`` are its entries, in the case or in a ``section`` in the plane that stands for it.
+    ``mesh`` are its entries in the case, or in the plane ``section`` that represents the case.
     """
 
     mesh: Mapping[str, Any]
@@ -69,22 +69,22 @@ class Finer(Generic[AnyWearCase]):
 
 
 def no_cycles(case: WearCase, state: InterfaceState) -> None:
-    """Nobody knows the loads between two increments, or slips that friction would find."""
+    """Return None: the loads between two increments, or slips due to friction, are unknown."""
 
 
 @dataclass(frozen=True)
 class WearStructure(Generic[AnyWearCase]):
-    """What a wear run needs to know of a kind of structure.
+    """A kind of structure: functions of a case that a wear run calls.
 
-    ``case`` is the kind of case that has it, ``model`` gives the structure that it describes, or
-    another source of loads, ``extent``
-    how many they are, by which the time of a run is told, and ``memory`` what a run needs, given
-    the nodes of both bodies and of all interfaces (0: unknown). ``choose`` gives the case with the
-    settings that it leaves open, and a record of why; ``warnings`` are about the unworn contact of
-    a stage under a peak load [N]. ``finer`` gives a finer mesh, if there is one that is cheap.
-    ``finer_cycles`` gives the unworn cycle and that on the surfaces of a state in twice as many
-    increments, where it is known what loads are in between and the half-space finds the slips.
-    ``settings`` of a case say what makes parts of the error smaller, if not :data:`SETTINGS`.
+    ``case`` is the class of its cases. ``model`` returns the structure of a case, or another source
+    of loads. ``extent`` returns the size of its loads, for the time estimate, and ``memory`` the
+    memory of a run, given the nodes of both bodies and of all interfaces (0: unknown). ``choose``
+    returns the case with its open settings decided, and a record of why. ``warnings`` are about the
+    unworn contact of a stage under a peak load [N]. ``finer`` returns a finer mesh, if there is a
+    cheap one. ``finer_cycles`` returns the unworn cycle and that on the surfaces of a state in
+    twice as many increments, if the loads in between are known and the half-space solves for the
+    slips. ``settings`` returns the settings that reduce parts of the error, where they differ from
+    :data:`SETTINGS`.
     """
 
     name: str
@@ -103,7 +103,7 @@ class WearStructure(Generic[AnyWearCase]):
         model = self.model(case)
         if not hasattr(model, "meshed"):
             return model
-        # Finite elements take a second to load: where they are used.
+        # Finite elements take a second to import, so they are imported only where they are used.
         from workflow.analyses.wear.translation import structure_loads
 
         return structure_loads(case, lambda _: cast("StructureModel", model))

@@ -1,4 +1,4 @@
-"""A wear case as a model: its contacts and how they wear, one function for each section."""
+"""Translation of a wear case into a model: one function for each section."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 
 
 def contact_of(case: WearCase, name: str) -> Contact:
-    """Return the contact of a name."""
+    """Return the contact with this name."""
     terms, settings = case.terms(name), case.contact
     return Contact(
         grid=terms.grid,
@@ -32,7 +32,7 @@ def contact_of(case: WearCase, name: str) -> Contact:
 
 
 def wear_of(case: WearCase) -> Wear:
-    """Return how far the contacts of a case wear, and when they change their loads."""
+    """Return the wear settings of a case, including when loads are updated."""
     wear, step, coupling = case.wear, case.wear.step, case.recoupling
     return Wear(
         cycles=wear.cycles,
@@ -59,7 +59,7 @@ def face_contact(
 def structure_loads(
     case: AnyWearCase, model: Callable[[AnyWearCase], StructureModel]
 ) -> StructureLoads:
-    """Return the loads of the structure that ``model`` makes of a case.
+    """Return the loads of the structure that ``model`` returns for a case.
 
     Its condensed parts are stored in the user's cache.
     """

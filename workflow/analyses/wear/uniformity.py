@@ -1,8 +1,8 @@
-"""How much alike the sections of a contact are: what decides whether one stands for all.
+"""Uniformity of a contact along y, which decides whether one section can represent all.
 
-A case in two dimensions (``structure.dimension: 2``) computes the middle section in plane strain,
-under the mean load per length. A run in three dimensions shows how good that would be: by how much
-P, slip and worn area change along y, and how far the mean load per length is from the one in the
+A case in two dimensions (``structure.dimension: 2``) computes the middle section in plane strain
+under the mean load per length. A run in three dimensions shows how accurate this would be: how much
+P, slip and worn area change along y, and how far the mean load per length is from that in the
 middle. Pressure and slip are the structure's, wear is the half-space's.
 """
 
@@ -22,20 +22,20 @@ from workflow.models.contact import FaceContact
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 
-# A middle below this share of the largest is rounding.
+# A value in the middle below this share of the largest is rounding.
 ROUNDING = 1e-9
-# Sections whose values are this close to the middle's count as alike: a few per cent.
+# Largest relative deviation from the middle at which sections count as equal: a few per cent.
 ALIKE = 0.05
-# Deviations are taken over this share of the length, around its middle: the ends are never alike.
+# Share of the length, around the middle, for deviations: the ends always differ.
 MIDDLE = 0.5
 
 
 @dataclass(frozen=True)
 class Sections:
-    """What the sections of a contact carry, per length, ``(ny,)`` along y.
+    """Loads and slip of the sections of a contact, per length, ``(ny,)`` along y.
 
-    ``P`` and ``Qx`` [N/mm] are those of the increment of peak load, ``energy`` [N mm/mm]
-    is dissipated in a mean cycle and ``slip`` [mm] the mean path of the nodes in it, weighted by
+    ``P`` and ``Qx`` [N/mm] are those of the increment of peak load, ``energy`` [N mm/mm] is
+    dissipated in a mean cycle and ``slip`` [mm] is the mean path of the nodes in it, weighted by
     their pressure at peak load.
     """
 
@@ -53,7 +53,7 @@ class Sections:
 def sections(
     transfer: FaceTransfer, history: InterfaceHistory, peak: int, friction: float
 ) -> Sections:
-    """Sections of a structure's contact, one per row of the transfer's grid."""
+    """Return the sections of a structure's contact, one per row of the transfer's grid."""
     grid = transfer.grid
     covered = transfer.covered.reshape(grid.shape) / grid.pitch[1]
 
@@ -74,14 +74,15 @@ def sections(
 
 @dataclass(frozen=True)
 class Uniformity:
-    """How uniform a contact is along y.
+    """Uniformity of a contact along y.
 
     ``pressure`` (P per length), ``slip`` and ``wear`` (worn area) are the largest deviations from
     the middle over the ``MIDDLE`` share of the length, relative to the middle.
     ``share_of_length_within`` is the share of the length, around the middle, over which all three
-    deviate by at most ``ALIKE``; ``mean_load`` the mean P per length over that in the middle.
-    ``uniform`` says whether one section stands for the middle: its likes reach at least as far to
-    either side as the face is wide, and the mean load is that of the middle within ``ALIKE``.
+    deviate by at most ``ALIKE``; ``mean_load`` is the mean P per length over that in the middle.
+    ``uniform`` says whether one section represents the middle: similar sections extend to either
+    side at least by the width of the face, and the mean load is that of the middle within
+    ``ALIKE``.
     """
 
     pressure: float
@@ -92,7 +93,7 @@ class Uniformity:
     uniform: bool
 
     def sentence(self, name: str) -> str:
-        """For the log."""
+        """Return a sentence for the log."""
         text = (
             f"{name}: sections alike within {ALIKE:.0%} over the middle "
             f"{self.share_of_length_within:.0%} of the length"
@@ -107,7 +108,7 @@ class Uniformity:
 def uniformities(
     source: LoadSource, stages: Sequence[FaceContact], states: Sequence[InterfaceState]
 ) -> dict[str, Uniformity]:
-    """Uniformity of every loaded contact of a structure in three dimensions, by interface."""
+    """Return the uniformity of every loaded contact of a 3D structure, by interface."""
     if not isinstance(source, StructureLoads) or source.line:
         return {}
     return {
@@ -120,7 +121,7 @@ def uniformities(
 def uniformity(
     stage: FaceContact, history: InterfaceHistory, state: InterfaceState, peak: int
 ) -> Uniformity | None:
-    """Uniformity of the unworn contact and of the wear so far; None without load in the middle."""
+    """Return the uniformity of unworn contact and wear so far; None without load in the middle."""
     carried = sections(stage.transfer, history, peak, stage.settings.friction(0.0))
     if _middle(carried.P) <= 0.0:
         return None
@@ -144,7 +145,7 @@ def uniformity(
 
 
 def _deviation(values: Array) -> Array:
-    """Difference from the middle relative to it ``(ny,)``, or to the largest of nothing there."""
+    """Return the relative difference from the middle ``(ny,)``; from the largest if that is 0."""
     middle = _middle(values)
     largest = float(np.abs(values).max())
     scale = abs(middle) if abs(middle) > ROUNDING * largest else largest
@@ -153,6 +154,6 @@ def _deviation(values: Array) -> Array:
 
 
 def _middle(values: Array) -> float:
-    """Mean of the one or two rows next to y = 0."""
+    """Return the mean of the one or two rows next to y = 0."""
     count = len(values)
     return float(values[(count - 1) // 2 : count // 2 + 1].mean())

@@ -1,4 +1,4 @@
-"""Things a user should know about a run that went well all the same."""
+"""Plausibility warnings about a run that completes without errors."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from workflow.models.structure import StructureLoads
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
-# Forces and moments on a body left out of balance, relative: the friction solver leaves 1e-7.
+# Relative imbalance of forces and moments on a body; the friction solver reaches 1e-7.
 OUT_OF_BALANCE = 1e-3
-# Nodes across a contact that carry its load, at least, for slips that are more than the mesh's.
+# Least number of loaded nodes across a contact for slips that the mesh resolves.
 FEWEST_NODES = 5
-# What may be unknown of a contact's form, in pressure over its peak: on a cylinder whose vertices
-# were moved at random, 3 to 8 times what that did.
+# Pressure due to the uncertain form of a contact face, relative to its peak. On a cylinder with
+# randomly moved vertices, this estimate was 3 to 8 times the actual change.
 FORM_SHARE = 0.1
-# Energies of structure and half-space over a cycle that differ by more indicate different slips.
+# Relative difference of the energies of structure and half-space that indicates different slips.
 ENERGIES_APART = 0.25
-# How much less the half-space with its own friction may dissipate than the nodes, which slip in
-# steps of an element: 0.3 to 0.5 on 12 x 16 nodes that never slide as a whole, 0.01 on 40 across.
-# More than the nodes is what it is there for.
+# Share by which the half-space with its own friction may dissipate less than the nodes, which slip
+# element by element: 0.3 to 0.5 on 12 x 16 nodes that never slide as a whole, 0.01 on 40 nodes
+# across. It may dissipate more, which is why it is used.
 FULL_APART = 0.6
-# Share of the work of sliding below which energies that differ are none: what a table rounds.
+# Share of the work of sliding below which a difference of energies is rounding of a table.
 NO_ENERGY = 1e-3
 
 
@@ -70,7 +70,7 @@ def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: 
 def _warn_of_few_nodes(
     history: InterfaceHistory, stage: StructureLoads, reporter: Reporter
 ) -> None:
-    """A contact on so few nodes that the structure hardly knows its size."""
+    """Warn of a contact on so few nodes that the structure hardly resolves its size."""
     face = history.interface
     pressed = int(np.count_nonzero(history.force[stage.peak, 2] > 0.0))
     least = FEWEST_NODES if face.line else FEWEST_NODES**2
@@ -83,7 +83,7 @@ def _warn_of_few_nodes(
 
 
 def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Reporter) -> None:
-    """A contact on faces that its mesh knows no better than pressure can tell."""
+    """Warn of faces whose form is less certain in the mesh than the pressure requires."""
     face = history.interface
     assert isinstance(face, Interface)
     pressed = history.force[stage.peak, 2] > 0.0
@@ -101,7 +101,7 @@ def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Re
 
 
 def form_left(face: Interface, pressed: Mask) -> float:
-    """How far the surfaces of both bodies may be off under the nodes ``pressed`` ``(n,)`` [mm]."""
+    """Return the error of form of both bodies under the nodes ``pressed`` ``(n,)`` [mm]."""
     below = pressed if face.projection is None else face.projection.T @ pressed > 0.0
     left = 0.0
     for number, nodes in ((1, below), (2, pressed)):
@@ -112,12 +112,12 @@ def form_left(face: Interface, pressed: Mask) -> float:
 
 
 def _mesh_size(face: Face) -> float:
-    """Of the facets of a face, along their sides [mm]."""
+    """Return the size of the facets of a face, along their sides [mm]."""
     return float(np.median(face.facet_sizes if face.line else np.sqrt(2.0 * face.facet_sizes)))
 
 
 def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:
-    """Loads of a cycle that does not close, as far as their file tells."""
+    """Warn if the cycle of a loads file does not close, as far as the file says."""
     closures = [imported.closure or 0.0 for imported in source.imported.values()]
     if max(closures) > CLOSED:
         reporter.warn(
@@ -135,9 +135,9 @@ def warn_of_contact(
     first: list[FirstContact],
     reporter: Reporter,
 ) -> None:
-    """Unlike bodies, pressures above yield, contacts at the border or on few cells, edge peaks.
+    """Warn of dissimilar bodies, yielding, contacts at the border or on few cells, and edge peaks.
 
-    Raises UserError where no cells are left of a contact.
+    Raises UserError if a contact has too few cells.
     """
     unlike = [stage.pair for stage in stages if not stage.pair.similar]
     if case.contact.method == "normal" and unlike:
@@ -174,7 +174,7 @@ def warn_of_contact(
 def _energies_apart(
     source: LoadSource, stage: FaceContact, loads: LoadHistory, first: FirstContact
 ) -> str:
-    """What is wrong where source and half-space disagree on the energy of a cycle, if they do."""
+    """Return the reason why source and half-space differ in energy, or an empty string."""
     from_file, told = isinstance(source, ResultantsSource), loads.mean_energy
     found, unit = float(first.energy.sum()), "N" if stage.grid.line else "N mm"
     if abs(found - told) <= ENERGIES_APART * max(found, told):
@@ -203,7 +203,7 @@ def _energies_apart(
 
 
 def _work_of_sliding(stage: FaceContact, loads: LoadHistory) -> float:
-    """About the work of friction as a contact begins to slide: µP on µP over its stiffness."""
+    """Return the approximate work of friction at the onset of sliding: (µP)² over the stiffness."""
     friction = stage.settings.friction(0.0)
     shear, modulus = friction * float(loads.P.max()), stage.pair.contact_modulus
     width = 1.0 if stage.grid.line else np.sqrt(np.prod(stage.grid.size))
@@ -213,7 +213,7 @@ def _work_of_sliding(stage: FaceContact, loads: LoadHistory) -> float:
 def warn_of_instability(
     stages: list[FaceContact], state: CoupledState, cycles: float, reporter: Reporter
 ) -> None:
-    """Explicit steps of so many cycles that are too long."""
+    """Warn of explicit steps with more cycles than is stable."""
     pairs = zip(stages, state.interfaces, strict=True)
     stable = min(stage.stable_cycles(interface) for stage, interface in pairs)
     if cycles > stable:
@@ -224,7 +224,7 @@ def warn_of_instability(
 
 
 def warn_of_growth(stages: list[FaceContact], state: CoupledState, reporter: Reporter) -> None:
-    """Half-spaces in contact that have grown to the border of their grid: they have worn there."""
+    """Warn of half-space contacts that have worn up to the border of their grid."""
     for stage, interface in zip(stages, state.interfaces, strict=True):
         worn = interface.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
@@ -232,7 +232,7 @@ def warn_of_growth(stages: list[FaceContact], state: CoupledState, reporter: Rep
 
 
 def warn_of_many_jumps(wear: Duration, state: CoupledState, left: int, reporter: Reporter) -> None:
-    """Runs of more jumps than anybody looks at, and what makes them fewer."""
+    """Warn of a run with very many jumps, and name the setting that reduces them."""
     key = next((key for key in SIZES if getattr(wear.step, key) is not None), None)
     longer = "wear.tolerance" if key is None else f"wear.step.{key}"
     reporter.warn(
@@ -245,7 +245,7 @@ def warn_of_many_jumps(wear: Duration, state: CoupledState, left: int, reporter:
 def warn_of_worn_cells(
     case: WearCase, peak: int, stages: list[FaceContact], state: CoupledState, reporter: Reporter
 ) -> None:
-    """Contacts that carry the peak load on few cells after they have worn."""
+    """Warn of worn contacts that carry the peak load on few cells."""
     for stage, interface in zip(stages, state.interfaces, strict=True):
         if peak in interface.starts:
             pressure = interface.starts[peak].pressure
@@ -254,7 +254,7 @@ def warn_of_worn_cells(
 
 
 def warn_of_border(stage: FaceContact, reporter: Reporter) -> None:
-    """A contact cut off by the end of its grid."""
+    """Warn of a contact that is cut off by the border of its grid."""
     reporter.warn(
         f"{stage.name}: the contact touches the border of its grid, where it is cut off: "
         f"{stage.remedy}"

@@ -1,4 +1,4 @@
-"""Worn surfaces written back to the user's nodes at the end of a run."""
+"""Transfer of worn surfaces to the user's nodes at the end of a run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from workflow.models.loads import LoadSource, UserFace
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
-# Nodes that carry less than this share of the worn volume leave some of the wear out.
+# Share of the worn volume that the nodes must carry to avoid a warning.
 FULL_SHARE = 0.99
 
 
@@ -31,7 +31,7 @@ def write_worn_faces(
     folder: OutputFolder,
     reporter: Reporter,
 ) -> dict[str, dict[str, Any]]:
-    """Write what the user's nodes lose, where there are any; for the summary, by interface."""
+    """Write the wear at the user's nodes, if there are any; return its summary by interface."""
     summary: dict[str, dict[str, Any]] = {}
     for number, (stage, state) in enumerate(zip(stages, states, strict=True)):
         for face in source.user_faces(number):
@@ -48,18 +48,18 @@ def write_worn_faces(
             summary.setdefault(stage.name, {})[f"body_{face.body}"] = {
                 "file": name,
                 "nodes": len(face.numbers),
-                # JSON has no NaN: no share where nothing is worn.
+                # JSON has no NaN, so there is no share where nothing is worn.
                 "volume_share": None if np.isnan(worn.volume_share) else worn.volume_share,
             }
     return summary
 
 
 def _worn_nodes(face: UserFace, stage: FaceContact, state: InterfaceState) -> NodalDepths:
-    """What the user's nodes lose: those of the contact's own face, or at places of their own."""
+    """Return the worn depth at the user's nodes, on the contact face or at separate points."""
     depth = stage.on_grid(state).depths[face.body - 1]
     if face.points is not None:
         return nodal_depths(face.points, face.frame, stage.grid, depth)
     nodal = stage.depths_of_bodies(state)[face.body - 1]
     worn = NodalDepths.of(nodal, stage.face_of(face.body).facet_shares, stage.grid, depth)
-    # Of a whole face the first nodes are those that are meshed.
+    # The meshed nodes come first among those of a whole face.
     return replace(worn, depth=worn.depth[: len(face.numbers)])

@@ -1,8 +1,8 @@
-"""Worn depth of a face as displacements of the user's own nodes.
+"""Worn depth of a face as displacements of the user's nodes.
 
 A node gets the mean of the depth around it, weighted by its shape function over the facets of its
 face, so that Σ depth x nodal area is exactly the volume worn on the grid where the nodes cover it.
-How much of it they carry is measured: ``NodalDepths.volume_share``.
+``NodalDepths.volume_share`` is the share of the volume that they carry.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from workflow.shell.tables import write_table
 
 NODE = "node"
 AXES = ("X", "Y", "Z")
-# A face may rise above its plane by this share of its extent: more is a wrong frame or a node set
-# that is not the contact face. Crowned and rounded faces stay below a hundredth.
+# Height of a face over its plane, relative to its extent, that indicates a wrong frame or a node
+# set that is not the contact face. Crowned and rounded faces stay below a hundredth.
 OFF_PLANE = 0.1
 
 
 @dataclass(frozen=True)
 class NodeTable:
-    """The user's node ``numbers`` ``(n,)`` of one face and their ``points`` ``(n, 3)`` [mm]."""
+    """Numbers ``(n,)`` of the user's nodes on one face and their ``points`` ``(n, 3)`` [mm]."""
 
     numbers: Indices
     points: Array
@@ -44,8 +44,8 @@ class NodeTable:
 class NodalDepths:
     """Worn ``depth`` at nodes ``(n,)`` [mm].
 
-    ``volume_share`` is Σ depth x nodal area over the volume worn on the grid: 1 where the nodes
-    cover all that is worn, NaN where nothing is.
+    ``volume_share`` is Σ depth x nodal area over the volume worn on the grid: 1 if the nodes cover
+    the whole worn area, NaN if nothing is worn.
     """
 
     depth: Array
@@ -53,13 +53,13 @@ class NodalDepths:
 
     @classmethod
     def of(cls, nodal: Array, areas: Array, grid: Grid, depth: Array) -> NodalDepths:
-        """Depths at nodes of such ``areas`` ``(n,)`` for ``depth`` ``(nx, ny)`` on the grid."""
+        """Return depths at nodes of ``areas`` ``(n,)`` with ``depth`` ``(nx, ny)`` on the grid."""
         worn = float(depth.sum()) * grid.cell_area
         return cls(nodal, float(nodal @ areas) / worn if worn else np.nan)
 
 
 def read_nodes(file: str | Path) -> NodeTable:
-    """Node table ``node, X, Y, Z`` in global axes; Z may be left out of a plane model.
+    """Return the node table ``node, X, Y, Z`` in global axes; a plane model may omit Z.
 
     Raises InputFileError.
     """
@@ -76,10 +76,10 @@ def read_nodes(file: str | Path) -> NodeTable:
 
 
 def nodal_depths(points: Array, frame: Frame, grid: Grid, depth: Array) -> NodalDepths:
-    """Worn depth at nodes of a face, from ``depth`` ``(nx, ny)`` [mm] on the grid in its frame.
+    """Return worn depths at nodes of a face from ``depth`` ``(nx, ny)`` [mm] on the grid.
 
-    ``points`` ``(n, 3)`` [mm] are in global axes; beyond the grid nothing is worn. Raises FaceError
-    unless they are the nodes of a face in that frame.
+    ``points`` ``(n, 3)`` [mm] are in global axes and the grid lies in ``frame``; beyond the grid
+    nothing is worn. Raises FaceError unless the points are the nodes of a face in that frame.
     """
     coordinates = _in_plane(points, frame, grid.line)
     facets = facets_over(coordinates, grid.line)
@@ -96,16 +96,17 @@ def nodal_depths(points: Array, frame: Frame, grid: Grid, depth: Array) -> Nodal
 
 
 def worn_displacement(depth: Array, frame: Frame, body: Literal[1, 2]) -> Array:
-    """Displacement ``(n, 3)`` [mm] in global axes of nodes that lose ``depth`` ``(n,)``.
+    """Return displacements ``(n, 3)`` [mm] in global axes of nodes that lose ``depth`` ``(n,)``.
 
-    Into their own body: body 1 lies below the face and moves along -z of the frame, body 2 along z.
+    Nodes move into the body: body 1 lies below the face and moves along -z of the frame, body 2
+    along z.
     """
     inwards = {1: -1.0, 2: 1.0}[body] * frame.axes[2]
     return np.outer(depth, inwards)
 
 
 def write_worn_nodes(path: Path, nodes: Indices, displacement: Array) -> None:
-    """Write displacements ``(n, 3)`` [mm] by node number, such that they read back the same."""
+    """Write displacements ``(n, 3)`` [mm] by node number, in full precision."""
     along = {
         f"u{axis.lower()} [mm]": component
         for axis, component in zip(AXES, displacement.T, strict=True)
@@ -114,7 +115,7 @@ def write_worn_nodes(path: Path, nodes: Indices, displacement: Array) -> None:
 
 
 def _in_plane(points: Array, frame: Frame, line: bool) -> Array:
-    """Places ``(n, 2)`` of the nodes in the plane of the interface [mm]."""
+    """Return the places ``(n, 2)`` of the nodes in the plane of the interface [mm]."""
     local = frame.coordinates(points)
     extent, off = float(np.ptp(local[:, :2], axis=0).max()), float(np.abs(local[:, 2]).max())
     if off > OFF_PLANE * extent:
@@ -128,7 +129,7 @@ def _in_plane(points: Array, frame: Frame, line: bool) -> Array:
 
 
 def _meets(coordinates: Array, facets: Indices, grid: Grid) -> NDArray[np.bool_]:
-    """Facets ``(m,)`` whose box overlaps the grid's: on the others nothing is worn."""
+    """Return the mask ``(m,)`` of facets whose box overlaps the grid; others have no wear."""
     corners = coordinates[facets]
     half = 0.5 * np.array(grid.size)
     inside = (corners.min(axis=1) < half) & (corners.max(axis=1) > -half)
@@ -139,7 +140,7 @@ def _meets(coordinates: Array, facets: Indices, grid: Grid) -> NDArray[np.bool_]
 def check_nodes(file: str, frame: Frame, size: tuple[float, float], line: bool) -> None:
     """Raise unless the file has the nodes of a face of ``size`` [mm] in that frame.
 
-    InputFileError where the file is wrong, FaceError where its nodes are.
+    Raises InputFileError for an invalid file and FaceError for unsuitable nodes.
     """
     grid = Grid.over(size, (1, 1), line)
     nodal_depths(read_nodes(file).points, frame, grid, np.zeros(grid.shape))

@@ -1,4 +1,4 @@
-"""What a run says of its structure at the end: worn mesh, stress, loads with the worn faces."""
+"""Results of the structure at the end of a run: worn mesh, stress, loads with the worn faces."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ from workflow.shell.store import replacing
 
 RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
 FORCES = ("P", "Qx", "Qy")
-# What the summary has of a total Lagrangian check, beside the resultants.
+# Results of a total Lagrangian check in the summary, in addition to the resultants.
 MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_rotation")
 
 GLOBAL_STRESS = "stress xx, yy, zz, xy, yz, zx of the global axes"
-# Increments in which a structure is shown: enough for motion to look smooth, few enough to keep.
+# Largest number of increments shown: enough for smooth motion, few enough to store.
 MOST_INCREMENTS = 48
 
 
 @dataclass(frozen=True)
 class WornStructure:
-    """The structure before and after: ``cycle`` and ``mesh`` are the worn ones.
+    """The structure before and after wear: ``cycle`` and ``mesh`` are the worn ones.
 
-    ``stresses`` are those of all bodies, unworn and worn; ``written`` the meshes as they are shown
-    then, with bodies 2 in the form of their faces. ``shown`` are the increments, counted from 0, of
-    which the stresses tell the surfaces.
+    ``stresses`` are those of all bodies, unworn and worn. ``written`` are the meshes for output, in
+    which the faces of bodies 2 have their true form. ``shown`` are the increments, counted from 0,
+    in which the stresses include the surfaces.
     """
 
     stage: StructureLoads
@@ -63,15 +63,15 @@ class WornStructure:
 
     @cached_property
     def bolts(self) -> BoltTensions:
-        """What the bolts have of their tension, unworn and worn."""
+        """Tensions of the bolts, unworn and worn."""
         return BoltTensions(self.stage, self.stage.on_faces(self.cycle))
 
     def under(
         self, moment: str, number: int
     ) -> tuple[tuple[Array, Array], tuple[WholeStress, WholeStress], tuple[Array, Array] | None]:
-        """Motions of both bodies' faces under interface ``number``, stress at peak load.
+        """Return motions of both faces of interface ``number``, and stress fields at peak load.
 
-        And thermal strains of the faces, if there are any.
+        The third value holds the thermal strains of the faces, or None without temperatures.
         """
         stress, interface = self.stresses[moment], self.stage.mesh.interfaces[number]
         one, two = (whole_components(interface, moved) for moved in stress.faces[number])
@@ -84,11 +84,11 @@ class WornStructure:
         return (one, two), (field_1, field_2), (hot_1, hot_2)
 
     def loads(self, number: int) -> InterfaceHistory:
-        """What the whole face of interface ``number`` does over the worn cycle."""
+        """Return the worn cycle of the whole face of interface ``number``."""
         return self.stage.on_faces(self.cycle)[number]
 
     def write(self, writer: ResultsWriter, accuracy: float) -> None:
-        """Load histories of the worn faces, and all bodies unworn and worn."""
+        """Write load histories of the worn faces, and all bodies unworn and worn."""
         for history in self.stage.on_faces(self.cycle):
             name = history.interface.name
             put_face(writer, f"structure_worn/{name}", history.interface, history)
@@ -105,7 +105,7 @@ class WornStructure:
             writer.put(f"bodies/{name}/error", datasets_of(errors), accuracy=accuracy)
 
     def summary(self, state: CoupledState) -> dict[str, Any]:
-        """What the solver says of itself, and the largest stresses."""
+        """Return statistics of the solver and the largest stresses."""
         stage, unworn = self.stage, self.stage.unworn_cycle
         bodies = self.mesh.bodies
         return {
@@ -137,7 +137,7 @@ class WornStructure:
         }
 
     def warn(self, accuracy: float, reporter: Reporter) -> None:
-        """Notches of whose stress the mesh leaves more than the ``accuracy``."""
+        """Warn of notches whose stress has an error due to the mesh above ``accuracy``."""
         bodies = self.mesh.bodies
         for body, *fields in zip(bodies, *self._fields, strict=True):
             notches = [field.notch for field in fields if field.notch is not None]
@@ -151,11 +151,11 @@ class WornStructure:
 
     @property
     def _fields(self) -> tuple[tuple[StressField, ...], ...]:
-        """Of all bodies, unworn and worn."""
+        """Stress fields of all bodies, unworn and worn."""
         return tuple(stress.fields for stress in self.stresses.values())
 
     def _why(self, peak: PeakStress, accuracy: float) -> str:
-        """Why a stress is not to be trusted, and what helps."""
+        """Return the reason why a stress is unreliable, and a remedy."""
         if not peak.bounded:
             return (
                 "is beside a sharp inward corner, a fillet of fewer than nine elements round the "
@@ -168,7 +168,7 @@ class WornStructure:
         )
 
     def _errors(self) -> dict[str, dict[str, ResultError]]:
-        """Of the largest stress off the contact faces, by body; beside a sharp corner not known."""
+        """Return the error of the largest free-surface stress by body; unknown at sharp corners."""
         bodies = self.mesh.bodies
         errors = {}
         for body, *fields in zip(bodies, *self._fields, strict=True):
@@ -178,7 +178,7 @@ class WornStructure:
         return errors
 
     def sentences(self) -> Iterator[str]:
-        """The tensions of bolts and the largest stresses of each body, unworn and worn."""
+        """Yield the tensions of bolts and the largest stresses of each body, unworn and worn."""
         yield from self.bolts.sentences()
         bodies = self.mesh.bodies
         for body, unworn, worn in zip(bodies, *self._fields, strict=True):
@@ -193,7 +193,7 @@ class WornStructure:
             yield f"{body.name}: von Mises stress up to {', '.join(parts)}"
 
     def interface_summary(self, number: int, width: float) -> dict[str, Any]:
-        """Volumes in the mesh and resultants, unworn and worn; ``width`` [mm] is of the contact."""
+        """Return worn volumes in the mesh and resultants; ``width`` [mm] is that of the contact."""
         stage, interface = self.stage, self.stage.mesh.interfaces[number]
         unworn, worn = stage.unworn()[number].loads, self.loads(number).loads
         swept = [
@@ -209,7 +209,7 @@ class WornStructure:
                 "worn": resultants_at(worn, stage.peak),
             },
             "load_range": {"unworn": load_ranges(unworn), "worn": load_ranges(worn)},
-            # Where meshes do not match, the coarser one.
+            # Where meshes do not match, the coarser one counts.
             "elements_across": round(
                 min(elements_across(interface.face(k), width) for k in (1, 2)), 1
             ),
@@ -217,12 +217,12 @@ class WornStructure:
 
 
 def _mirrored_across(interface: Interface) -> list[str]:
-    """Axes across which planes of symmetry cut an interface."""
+    """Return the axes across which planes of symmetry cut an interface."""
     return ["xy"[axis] for axis in interface.planes]
 
 
 def _known(peaks: Sequence[PeakStress]) -> float | None:
-    """The largest error of these stresses, None where one of them has no bound."""
+    """Return the largest error of these stresses, or None if one of them has no bound."""
     return max(peak.error for peak in peaks) if all(p.bounded for p in peaks) else None
 
 
@@ -231,7 +231,7 @@ def _change(unworn: PeakStress, worn: PeakStress) -> str:
 
 
 def _peak(peak: PeakStress) -> dict[str, Any]:
-    """What the summary has of a largest stress."""
+    """Return the summary of a largest stress."""
     return {
         "von_mises": peak.von_mises,
         "maximum_principal": peak.maximum_principal,
@@ -241,7 +241,7 @@ def _peak(peak: PeakStress) -> dict[str, Any]:
 
 
 def _body(body: Body, field: StressField) -> dict[str, Dataset]:
-    """Mesh and stress of a body."""
+    """Return the datasets of a body's mesh and stress."""
     corners = "corner vertices of the tetrahedra, or of the triangles in the plane"
     principal = "largest principal stress at peak load"
     return {
@@ -255,7 +255,7 @@ def _body(body: Body, field: StressField) -> dict[str, Dataset]:
 
 
 def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> dict[str, Dataset]:
-    """The surface of a body over the increments, of which there may be many: single precision."""
+    """Return the datasets of a body's surface over the increments, in single precision."""
     seen = "surface of the body, or of all of it in the plane"
     largest = maximum_principal(surface.stress.swapaxes(0, 1))
     equivalent = von_mises(surface.stress.swapaxes(0, 1))
@@ -281,15 +281,15 @@ def worn_structure(
     folder: OutputFolder,
     reporter: Reporter,
 ) -> WornStructure:
-    """Solve the worn structure, put the worn shape into its mesh and write that.
+    """Solve the structure with worn gaps, build its worn mesh, write it, and compute stresses.
 
-    If friction ``evolves``, it is what contacts have come to. If the structure ``moves``, all
-    bodies are told over the increments too.
+    If friction ``evolves``, each contact has its coefficient at the end. If the structure
+    ``moves``, the surfaces of all bodies over the increments are included.
     """
     pairs = list(zip(contacts, state.interfaces, strict=True))
     depths = [contact.depths_of_bodies(interface) for contact, interface in pairs]
     meshed = list(map(meshed_depths, stage.mesh.interfaces, depths))
-    # Friction takes one thread, and knows the worn faces by their gaps.
+    # The friction solution uses one thread and represents worn faces by their gaps.
     worn = begun(partial(stage.worn_mesh, meshed))
     with reported_stage(reporter, stage, "structural friction", "increments"):
         cycle = stage.worn_cycle(
@@ -314,23 +314,23 @@ def worn_structure(
 
 
 def shown_increments(count: int, peak: int) -> list[int]:
-    """The increments, counted from 0, in which the structure is told: evenly, and at peak load."""
+    """Return the increments, counted from 0, to show: evenly spaced, with the peak load."""
     evenly = np.linspace(0, count - 1, min(count, MOST_INCREMENTS)).round().astype(int)
     evenly[np.argmin(np.abs(evenly - peak))] = peak
     return [int(increment) for increment in evenly]
 
 
 def meshed_depths(interface: Interface, depths: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Those of both bodies at the nodes that are meshed: of a whole face the first ones."""
+    """Return the depths of both bodies at meshed nodes, which come first in a whole face."""
     depth_1, depth_2 = depths
     return depth_1[: len(interface.nodes_1)], depth_2[: len(interface.nodes_2)]
 
 
 def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, StructureMesh]:
-    """The unworn mesh, first, and others of the same vertices in the form that their faces have.
+    """Return the meshes, the unworn one first, with vertices moved to the form of their faces.
 
-    Stress is not solved in it: a form ends with its face, and what is beside it would begin with a
-    corner, a notch that is none of the body's.
+    Stress is not solved on them: the form ends at the border of its face, where the mesh would get
+    a corner, a notch that the body does not have.
     """
     form = form_of(meshes["unworn"])
     try:
@@ -341,12 +341,12 @@ def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, S
 
 
 def resultants_at(loads: LoadHistory, increment: int) -> dict[str, float]:
-    """Forces and moments of one increment."""
+    """Return the forces and moments of one increment."""
     return {name: float(getattr(loads, name)[increment]) for name in RESULTANTS}
 
 
 def load_ranges(loads: LoadHistory) -> dict[str, dict[str, float]]:
-    """The ends of what forces reach in a cycle, and their increments counted from 1."""
+    """Return the least and largest forces in a cycle, with increments counted from 1."""
     ranges = {}
     for name in FORCES:
         force = getattr(loads, name)
@@ -361,7 +361,7 @@ def load_ranges(loads: LoadHistory) -> dict[str, dict[str, float]]:
 
 
 def _mesh_summary(body: Body) -> dict[str, Any]:
-    """How many elements, how large, and how far the worst is from a regular one."""
+    """Return the number and sizes of elements, and the quality of the worst one."""
     sizes = element_sizes(body.mesh)
     ends = {"smallest": sizes.min(), "median": np.median(sizes), "largest": sizes.max()}
     return {
@@ -372,7 +372,7 @@ def _mesh_summary(body: Body) -> dict[str, Any]:
 
 
 def nonlinearity_sentence(check: NonlinearCheck) -> str:
-    """How far geometric nonlinearity moves the contact at peak load."""
+    """Return a sentence on the effect of geometric nonlinearity at peak load."""
     force, moment = (float(np.abs(part).max()) for part in np.split(check.change, [3], axis=1))
     return (
         f"geometric nonlinearity at peak load moves P and Q by {force:.2%} of P, moments by "
@@ -381,7 +381,7 @@ def nonlinearity_sentence(check: NonlinearCheck) -> str:
 
 
 def nonlinearity_summary(stage: StructureLoads) -> dict[str, Any]:
-    """The stiffness used and, where the case wants one, the total Lagrangian check."""
+    """Return the stiffness used and, if requested, the results of the total Lagrangian check."""
     chosen = stage.model.nonlinearity
     if not chosen.check:
         return {"stiffness": chosen.stiffness}

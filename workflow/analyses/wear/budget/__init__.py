@@ -1,1 +1,1 @@
-"""The error budget of a wear run: what link, mesh, increments, grid, steps, solver leave."""
+"""Error budget of a wear run: errors due to link, mesh, increments, grid, steps and solver."""

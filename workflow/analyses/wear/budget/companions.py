@@ -1,4 +1,4 @@
-"""Cheap cases beside one's own, whose short lives differ from each other in one thing only."""
+"""Probe cases of a wear case: cheap variants whose short runs differ in one setting each."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ if TYPE_CHECKING:
     from wear.coupled import CoupledState
     from workflow.models.loads import LoadSource
 
-# Order of what a contact wears in the size of its cells.
+# Order of convergence of wear in the size of the contact cells.
 ORDER = 2.0
-# Cells along a direction of a contact that lives shortly, half of the case's at most; with fewer
-# than the least none lives. Lines have as many as strips: they cost next to nothing.
+# Cells along a direction of the contact of a probe run: at most half of the case's, and no coarser
+# grid has fewer than the least number. Line contacts use the largest number, since they are cheap.
 MOST_CELLS, FEWEST = 64, 8
-# Slower than this, loads that follow wear have hardly come to rest by the end of a life.
+# Below this rate, loads that follow wear have hardly settled by the end of a probe run.
 SLOW = 1e-2
 
 
 @dataclass(frozen=True)
 class Companions(Generic[AnyWearCase]):
-    """Cases that live shortly beside ``own``, which stands for the case that is run.
+    """Probe cases that are compared with ``own``, which represents the case of the run.
 
-    ``own`` has the ``same`` structure as that case, or a section in its place. ``finer`` is on a
-    mesh of which ``mesh_share`` times the difference is the error of ``own``, ``regridded`` on
-    another contact grid, of which ``grid_share`` times the difference is the error of the case, and
-    ``finer_cells`` times that of contacts of these names, whose grids are their own.
-    ``linked`` has its contacts linked to the nodes of the structure, which ``own`` has not. None
-    where there is no such case. ``coupled`` has a structure, whose loads can follow wear.
+    ``own`` has the ``same`` structure as that case, or a plane section in its place. ``finer`` has
+    a finer mesh; ``mesh_share`` times the difference is the error of ``own``. ``regridded`` has
+    another contact grid; ``grid_share`` times the difference is the error of the case, to be
+    multiplied by ``finer_cells`` for contacts with separate grids. ``linked`` has its contacts
+    linked to the nodes of the structure, if ``own`` does not. Each is None where there is no such
+    case. ``coupled`` says whether the loads come from a structure, so that they can follow wear.
     """
 
     own: AnyWearCase
@@ -62,7 +62,7 @@ class Companions(Generic[AnyWearCase]):
     def of(
         cls, case: AnyWearCase, finer: Finer[AnyWearCase] | None, line: bool
     ) -> Companions[AnyWearCase]:
-        """Those of a case with, or without, a ``finer`` mesh; ``line`` as of its own contacts."""
+        """Return the probe cases of a case; ``line`` says whether it has line contacts."""
         section = None if finer is None else finer.section
         line = line or section is not None
         across, along = case.contact.grid
@@ -92,14 +92,16 @@ class Companions(Generic[AnyWearCase]):
         failed: Callable[[str, Exception], None],
         progress: Progress = unseen,
     ) -> tuple[dict[str, Worn], float]:
-        """Relative errors of what is worn and of pressures: by how much the run tells too much.
+        """Return relative errors of wear and pressures, positive where a result is too large.
 
-        What ``mesh``, ``grid`` and ``link`` leave, and under ``coupling`` loads that do not follow
-        wear at all, of which those that do it late have the share :func:`late`. How fast these come
-        to rest is returned beside. ``source`` is that of the case itself, not needed where another
-        structure is in its place.
-        Parts of which a life fails are left out and given to ``failed``; ``progress`` is told how
-        many have been lived, that of ``own`` first. Raises :data:`LIFE_FAILURES` where that fails.
+        They are the errors due to ``mesh``, ``grid`` and ``link`` and, under ``coupling``, those of
+        loads that do not follow wear at all; loads that follow late cause the share :func:`late` of
+        these. The second value is the rate at which the loads settle. ``source`` is that of the
+        case itself, not needed where another structure replaces it.
+
+        A part whose probe run fails is left out and passed to ``failed``. ``progress`` is called
+        with the number of probe runs done, that of ``own`` first. Raises :data:`LIFE_FAILURES` if
+        that one fails.
         """
         errors, (parts, following) = {}, self._parts(source, source_of)
         for lived, (part, told) in enumerate(parts.items(), 1):
@@ -113,9 +115,9 @@ class Companions(Generic[AnyWearCase]):
     def _parts(
         self, source: LoadSource | None, source_of: Callable[[AnyWearCase], LoadSource]
     ) -> tuple[dict[str, Callable[[], Worn]], Callable[[], Lived]]:
-        """What tells each part, once ``own`` has lived; and its life under loads that follow."""
+        """Run ``own``; return a function for each part, and one for its run with updated loads."""
         shared = source if source is not None and self.same else source_of(self.own)
-        # Where loads follow wear, what the mesh makes of it counts as well.
+        # Where loads follow wear, the effect of the mesh on this counts as well.
         follows = self.own.recoupling.resultants != "constant"
         kind: Literal["constant", "every"] = "every" if follows else "constant"
         life = live(self.own, shared, kind)
@@ -123,7 +125,7 @@ class Companions(Generic[AnyWearCase]):
 
         @cache
         def apart() -> Worn:
-            """Under unworn loads, which are enough for what the contacts alone make of them."""
+            """Return the results under unworn loads, which suffice for effects of the contacts."""
             return _worn(live(self.own, shared, "constant", life)) if follows else own
 
         @cache
@@ -148,7 +150,7 @@ class Companions(Generic[AnyWearCase]):
         return parts, following
 
     def _of_grids(self, errors: Worn) -> Worn:
-        """Errors of ``contact.grid`` as those of each contact's own."""
+        """Return errors of ``contact.grid`` scaled to the grid of each contact."""
         return {
             name: scaled({name: numbers}, self.finer_cells.get(name, 1.0))[name]
             for name, numbers in errors.items()
@@ -156,11 +158,11 @@ class Companions(Generic[AnyWearCase]):
 
 
 def late(rest: float, followed: Array) -> float:
-    """Error of loads that follow late, over what a life changes if loads do not follow at all.
+    """Return the error of loads that follow late, relative to that of loads that never follow.
 
-    What wear does to the loads, and these to wear, comes to rest: h' = 1 - z h, with z = ``rest``
+    The effect of wear on the loads, and of these on wear, settles: h' = 1 - z h, with z = ``rest``
     over all cycles, has worn (1 - exp(-z)) / z by the end. With h from the solution before, in
-    shares ``followed`` of the cycles (1 - Π(1 - z s)) / z, and 1 with unworn loads.
+    shares ``followed`` of the cycles, it is (1 - Π(1 - z s)) / z, and 1 with unworn loads.
     """
     z = max(rest, SLOW)
     apart = z - 1.0 + (1.0 - z / STEPS) ** STEPS
@@ -168,7 +170,7 @@ def late(rest: float, followed: Array) -> float:
 
 
 def _rest(life: Lived) -> float:
-    """How fast loads that follow come to rest, by how much less they drift in the second step."""
+    """Return the rate at which loads settle, from the smaller drift in the second step."""
     _, first, second, *_ = life[1][-1].drift
     return STEPS * float(np.clip(1.0 - second / first, 0.0, 1.0)) if first > 0.0 else 0.0
 
@@ -177,9 +179,9 @@ Cells = tuple[int, int]
 
 
 def _strips(own: Cells, of_case: Cells) -> tuple[Cells, float]:
-    """Strips to compare ``own`` with, and the share of the difference that is the case's error.
+    """Return the strips to compare ``own`` with, and the factor from difference to error.
 
-    Those of the case, where they are fewer and know less of edges, else twice as many.
+    They are those of the case if these are fewer and resolve edges less, else twice as many.
     """
     (strips, along), fewer = own, of_case[0] / own[0]
     if fewer < 1.0:
@@ -188,19 +190,19 @@ def _strips(own: Cells, of_case: Cells) -> tuple[Cells, float]:
 
 
 def _cells(own: Cells, of_case: Cells) -> tuple[Cells | None, float]:
-    """The same of cells: half as many along each direction, if these are enough."""
+    """Return half as many cells along each direction, if enough, and the factor to the error."""
     half = own[0] // 2, own[1] // 2
     share = -1.0 / (2.0**ORDER - 1.0) * (own[0] / of_case[0]) ** ORDER
     return half if min(half) >= FEWEST else None, share
 
 
 def _fewer(cells: int) -> int:
-    """Half of the cells along a direction, as long as these are many."""
+    """Return half of the cells along a direction, within the limits of probe runs."""
     return max(min(cells, 2 * FEWEST), min(MOST_CELLS, cells // 2))
 
 
 def _worn(life: Lived) -> Worn:
-    """What a life wears of both bodies together, and its largest pressures."""
+    """Return the wear of both bodies in a probe run, and its largest pressures."""
     stages, (begin, *_, end) = life
     pressures = zip(*(_largest_pressures(state) for state in (begin, end)), strict=True)
     return {
@@ -212,7 +214,7 @@ def _worn(life: Lived) -> Worn:
 
 
 def _largest_pressures(state: CoupledState) -> list[float]:
-    """By interface, in its cycle [MPa]."""
+    """Return the largest pressure in the cycle of each interface [MPa]."""
     return [
         max((start.pressure.max() for start in interface.starts.values()), default=0.0)
         for interface in state.interfaces
@@ -220,7 +222,7 @@ def _largest_pressures(state: CoupledState) -> list[float]:
 
 
 def _apart(own: Worn, other: Worn, share: float) -> Worn:
-    """So large a share of the relative differences; below 0 where ``own`` is the finer one."""
+    """Return ``share`` times the relative differences; below 0 if ``own`` is the finer case."""
     return {
         name: {
             key: share
@@ -232,7 +234,7 @@ def _apart(own: Worn, other: Worn, share: float) -> Worn:
 
 
 def scaled(errors: Worn, share: float) -> Worn:
-    """A share of errors."""
+    """Return the errors multiplied by ``share``."""
     return {
         name: {key: share * error for key, error in numbers.items()}
         for name, numbers in errors.items()

@@ -1,4 +1,4 @@
-"""The error budget of a finished run, with what short lives of companions tell beside it."""
+"""Computation of the error budget of a finished run, including the results of probe runs."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ Begun = Callable[[Array, Progress], Lives]
 
 
 def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str, Errors]:
-    """Errors of the main results by interface, each by what leaves them.
+    """Return the errors of the main results by interface, each by its sources.
 
-    ``begun`` are the lives of companions.
+    ``begun`` returns the results of the probe runs.
     """
     with reporter.stage("error budget", "short lives") as progress:
         lives = begun(followed(outcome), progress)
@@ -47,11 +47,11 @@ def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str
 def lives_of_companions(
     case: WearCase, source: LoadSource, reporter: Reporter, beside: Beside
 ) -> Begun:
-    """What companions tell, once it is known when loads followed wear (see :func:`followed`).
+    """Return a function for the errors from probe runs, given when the loads followed wear.
 
-    Nothing where none are asked for, or of parts that fail. They begin to live at once, in a
-    process beside this one, unless that would need a copy of a large structure: then when they are
-    asked.
+    Errors are left out if the case requests no probe runs, and for parts whose probe run fails.
+    Probe runs start at once in a worker process, unless this needs a copy of a large structure:
+    then they start when the function is called (see :func:`followed`).
     """
     if case.error_budget == "known" or case.contact.method == "nodes":
         return lambda *_: {}
@@ -78,7 +78,7 @@ def _lived(
     source: LoadSource | None,
     progress: Progress = unseen,
 ) -> Told:
-    """What companions tell of a case, whose own ``source`` those have that live on it."""
+    """Return the errors from the probe runs of a case; ``source`` is that of its own structure."""
     failures: list[tuple[str, str]] = []
 
     def failed(part: str, error: Exception) -> None:
@@ -93,7 +93,7 @@ def _lived(
 
 
 def followed(outcome: Outcome) -> Array:
-    """Shares of the cycles of a run from one solution of its structure to the next, or the end."""
+    """Return shares of the run's cycles from one structural solution to the next, or the end."""
     coupling, state = outcome.case.recoupling, outcome.state
     solved = {
         "constant": np.zeros(len(state.cycles), dtype=bool),

@@ -1,7 +1,7 @@
-"""Short lives of a case: what its structure and contacts make of all cycles in a few steps.
+"""Probe runs of a case: its structure and contacts wear over all cycles in a few steps.
 
-Lives on settings that differ in one thing share the error of their few steps, nearly, and leave the
-difference that this one thing makes.
+Probe runs with settings that differ in one thing have nearly the same error due to their few steps,
+so that their difference is the effect of this setting.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from workflow.models.loads import LoadSource
 Worn = dict[str, dict[str, float]]  # by interface and quantity
 Lived = tuple[list[FaceContact], list[CoupledState]]
 
-# What a life may end in.
+# Errors that may end a probe run.
 FAILURES = (MeshError, NormalContactError, ContactFailure, MethodFailed)
-# And that of a case that nobody has checked yet.
+# Errors that may end a probe run of a case that is not checked yet.
 LIFE_FAILURES = (*FAILURES, MotionError, UserError)
-# Implicit steps of a life. On the default joint 3 and 8 give the same errors of increments and
-# meshes within 2 %, and of grids within 20 % of these errors.
+# Number of implicit steps. On the default joint, 3 and 8 steps give the same errors of increments
+# and meshes within 2 %, and of grids within 20 % of these errors.
 STEPS = 3
-# Of the contact solver: a thousandth of the differences that lives resolve.
+# Tolerance of the contact solver: a thousandth of the differences that probe runs resolve.
 TOLERANCE = 1e-5
 
 
 def shortened(case: AnyWearCase, settings: Mapping[str, Any]) -> AnyWearCase:
-    """A case whose life is short, with other ``settings`` by their dotted paths."""
+    """Return the case of a probe run, with other ``settings`` by their dotted paths."""
     step = Step.model_construct(kind="implicit", cycles=case.wear.cycles / STEPS)
     return changed(
         case,
@@ -61,13 +61,13 @@ def live(
     resultants: Literal["constant", "every"] = "constant",
     begun: Lived | None = None,
 ) -> Lived:
-    """The contacts of a life under the loads of ``source``, and its states, the unworn one first.
+    """Return the contacts of a probe run and its states, the unworn one first.
 
-    It goes the other way from the unworn state of one that has ``begun``, if that is given. Raises
-    one of :data:`FAILURES` where structure or contacts fail.
+    With ``begun``, it starts from the unworn state of that run and with its contacts. Raises one of
+    :data:`FAILURES` if structure or contacts fail.
     """
     if begun is None:
-        # What its steps leave is not asked, nor what loads the structure lays on the last surfaces.
+        # The error of its steps and the loads on its last surfaces are not needed.
         stages = [face_contact(case, face, ImplicitStepper(alone=True)) for face in source.faces]
     else:
         stages = begun[0]
@@ -81,7 +81,7 @@ def live(
 
 
 def worn_by(stages: Sequence[FaceContact], state: CoupledState) -> Worn:
-    """Largest depth [mm] and volume [mm³, per length mm²] of both bodies together."""
+    """Return the largest depth [mm] and the volume [mm³, per length mm²] of both bodies."""
     depths = [interface.surfaces.depth for interface in state.interfaces]
     return {
         stage.name: {"depth": float(depth.max()), "volume": stage.volume(depth)}

@@ -1,7 +1,8 @@
-"""What each approximation of a run is estimated to leave of its main results.
+"""Estimated error of the main results due to each approximation of a run.
 
-Errors are relative. Of some parts the sign is known, positive where the run tells too much; the
-others may all be of one. A part that nobody knows is None, one that a run does not have is missing.
+Errors are relative. Some parts have a known sign, positive where the run's value is too large; the
+others may all have the same sign. A part is None if it is unknown, and missing if a run does not
+have this approximation.
 """
 
 from __future__ import annotations
@@ -17,29 +18,29 @@ from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.layout import PRESSURES, WORN
 from workflow.analyses.wear.outcome import InterfaceOutcome
 
-# How often the energy and the pressure count in a fretting parameter: Ruiz's is work times tension,
-# that of Smith, Watson and Topper stress times strain, that of Findley a stress.
+# Powers of energy and pressure in a fretting parameter: Ruiz's is work times tension, that of
+# Smith, Watson and Topper stress times strain, that of Findley a stress.
 POWERS = {"ruiz": (1, 1), "smith_watson_topper": (0, 2), "findley": (0, 1)}
-# The contact solver's tolerance leaves so much of itself: at most 0.35 of depth and volume was
-# found, for tolerances from 1e-3 to 1e-6 on two dovetails' flanks.
+# Error due to the contact solver's tolerance, relative to the tolerance: at most 0.35 was found in
+# depth and volume, for tolerances from 1e-3 to 1e-6 on the flanks of two dovetails.
 LEFT_BY_TOLERANCE = 0.5
-# Parts are known to about a half of themselves: so much is left where their signs cancel.
+# Relative uncertainty of parts, which remains where their signs cancel.
 UNCERTAIN = 0.5
 
 
 @dataclass(frozen=True)
 class ResultError:
-    """Estimated error of one result by its ``parts``, relative, those ``signed`` with a sign."""
+    """Estimated relative error of one result by ``parts``, of which the ``signed`` have a sign."""
 
     parts: Mapping[str, float | None]
     signed: frozenset[str] = frozenset()
 
     @property
     def total(self) -> float:
-        """Root mean square of what all known parts may leave together.
+        """Root mean square of the error that all known parts may cause together.
 
-        (Σ s)² + u² Σ s² + (Σ e)² over parts s of known sign, each of them off by a share u of
-        itself, and sizes e of the others.
+        (Σ s)² + u² Σ s² + (Σ e)² over parts s of known sign, each with a relative uncertainty u,
+        and sizes e of the others.
         """
         known = {name: part for name, part in self.parts.items() if part is not None}
         signs = [part for name, part in known.items() if name in self.signed]
@@ -48,7 +49,7 @@ class ResultError:
 
     @property
     def unknown(self) -> list[str]:
-        """Parts of which nothing is known."""
+        """Names of the unknown parts."""
         return [name for name, part in self.parts.items() if part is None]
 
     @property
@@ -61,8 +62,8 @@ class ResultError:
 Errors = dict[str, ResultError]  # by result
 Probed = Mapping[str, Mapping[str, float]]  # by part and result
 ByResult = Mapping[str, float | None]
-# Parts whose signs are known, by result: energies, and what lives tell, but for pressures at worn
-# edges. Steps and increments make some places of a surface too deep and others too shallow.
+# Parts with known signs, by result: energies and the errors from probe runs, except for pressures
+# at worn edges. Steps and increments make some places of a surface too deep and others too shallow.
 SIGNED = {
     "depth": frozenset({"link", "mesh", "grid", "coupling"}),
     "volume": frozenset({"link", "mesh", "increments", "grid", "coupling"}),
@@ -71,7 +72,7 @@ SIGNED = {
 
 
 def errors_of(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Probed) -> Errors:
-    """Errors of one contact; ``probed`` are those that lives of companions told of some parts."""
+    """Return the errors of one contact; ``probed`` are those of some parts, from probe runs."""
     solver = LEFT_BY_TOLERANCE * case.contact.tolerance
     parts: dict[str, ByResult] = {
         "link": _link(contact, probed),
@@ -108,22 +109,22 @@ def _error(parts: Mapping[str, ByResult], result: str) -> ResultError:
 
 
 def _link(contact: InterfaceOutcome, probed: Probed) -> ByResult:
-    """What the half-space makes else of the structure's loads: energies, and what a fit leaves."""
+    """Return the error due to the link: the difference of energies, and the error of the fit."""
     link = contact.first.link
     if not link.corrects:
         return _told(probed, "link", WORN | PRESSURES)
     structural, on_grid = contact.unworn.loads.mean_energy, float(contact.first.energy.sum())
     apart = (on_grid - structural) / structural if structural > 0.0 else 0.0
-    if "mesh" in probed:  # which has the misfit in it
+    if "mesh" in probed:  # which includes the misfit
         return dict.fromkeys(WORN, apart)
     return {**dict.fromkeys(WORN, apart), **dict.fromkeys(PRESSURES, float(link.quality[1]))}
 
 
 def _grid(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Probed) -> ByResult:
-    """Return the error due to the grid: of a peak from its neighbours where no probe run tells.
+    """Return the error due to the grid, from neighbouring cells if there is no probe run.
 
-    Lives slide wherever their loads have them slide. In partial slip the border of the zone that
-    sticks comes to what they tell, and is what is known where they tell nothing.
+    Probe runs slide wherever their loads slide. In partial slip the error due to the border of the
+    stick zone is added, and is the only known part without probe runs.
     """
     told = _told(probed, "grid", (*WORN, "peak_pressure"))
     if case.contact.method == "full":
@@ -135,33 +136,33 @@ def _grid(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Probed) 
 
 
 def _with(told: float | None, border: float) -> float | None:
-    """The error that lives have told and that of a border, 0 where there is none."""
+    """Return the sum of a probed error and that of a border, which may be 0."""
     return told if border == 0.0 else border + (told or 0.0)
 
 
 def _told(probed: Probed, part: str, results: Iterable[str]) -> dict[str, float | None]:
-    """What lives have told of a part."""
+    """Return the errors of a part from probe runs, or None where there are none."""
     return {result: probed[part][result] if part in probed else None for result in results}
 
 
 def _by_result(left: Mapping[str, float] | None, *names: str) -> ByResult:
-    """Estimates by the names that they have for depth, volume and worn peak pressure."""
+    """Return estimates by result, given their names for depth, volume and worn peak pressure."""
     results = (*WORN, "worn_peak_pressure")
     return {r: None if left is None else left[name] for r, name in zip(results, names, strict=True)}
 
 
 def _sum(n: int, first: float | None, m: int, second: float | None) -> float | None:
-    """So many times one and so many times the other; None where one of them is not known."""
+    """Return ``n`` times one part plus ``m`` times another, or None if one of them is unknown."""
     if (n and first is None) or (m and second is None):
         return None
     return n * abs(first or 0.0) + m * abs(second or 0.0)
 
 
 def peak_left(pressure: Array) -> float:
-    """By how much cells of twice the size would show less of the peak of a ``pressure`` (nx, ny).
+    """Return by how much cells of twice the size would lower the peak of ``pressure`` (nx, ny).
 
-    A smooth peak has nearly the same mean over them; one at an edge, which has no limit, is told by
-    it. 0 where nothing is pressed.
+    A smooth peak has nearly the same mean over these cells; a peak at an edge, which has no limit,
+    is lowered much. The result is 0 where nothing is pressed.
     """
     means = pressure
     for axis in (0, 1):

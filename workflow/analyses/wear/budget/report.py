@@ -1,4 +1,4 @@
-"""The error budget as a run tells it: in a few lines, in warnings, in the summary and results."""
+"""Report of the error budget: a few lines, warnings, entries of summary and results."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from workflow.shell.dataset import Dataset
 
 Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
 
-# Pressure at the edges that wear makes, and stress below them, may be so many times farther off:
-# the finer the cells, the larger they are.
+# Factor on the accuracy for pressure at worn edges, and stress below them: both grow as the cells
+# become finer.
 AT_EDGES, EDGES = 5.0, ("worn_peak_pressure", "life")
-# So many parts are told in a line, and none below this share of the total.
+# Number of parts that a line lists, and the least share of the total for a part to be listed.
 MOST_PARTS, WORTH_TELLING = 2, 0.1
 
 
 def summary_of(errors: Mapping[str, ResultError]) -> dict[str, Any]:
-    """By result, its parts and their ``total``; None for what nobody knows."""
+    """Return the parts of each result and their ``total``; None for unknown ones."""
     return {name: {**error.parts, "total": error.total} for name, error in errors.items()}
 
 
 def datasets_of(errors: Mapping[str, ResultError]) -> dict[str, Dataset]:
-    """By result, its parts in the order of ``PARTS``, nan for unknown ones, and their total."""
+    """Return each result's parts in the order of ``PARTS``, nan if unknown, and their total."""
     what = (
         f"estimated relative errors by {', '.join(PARTS)}, above 0 where too much is told, and "
         "their total"
@@ -44,9 +44,9 @@ def _number(part: float | None) -> float:
 
 
 def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
-    """What is left of every result; the largest parts of what is farthest off, and unknown ones.
+    """Yield the error of every result, the largest parts of the worst one, and unknown parts.
 
-    All of them are in the summary.
+    The summary has all of them.
     """
     if not errors:
         return
@@ -69,7 +69,7 @@ def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
 def warning_of(
     name: str, errors: Mapping[str, ResultError], accuracy: float, settings: Mapping[str, str]
 ) -> str | None:
-    """Results that are farther off than the ``accuracy``, and the setting of the largest part."""
+    """Return a warning about results beyond ``accuracy``, with a setting for the largest part."""
     allowed = {name: accuracy * (AT_EDGES if name in EDGES else 1.0) for name in errors}
     beyond = {name: error for name, error in errors.items() if error.total > allowed[name]}
     if not beyond:

@@ -1,1 +1,1 @@
-"""What cases of wear are made of, whatever loads their contacts."""
+"""Sections and base classes of wear cases, whatever the source of their loads."""

@@ -1,4 +1,4 @@
-"""What all wear cases share: contacts with friction that wear under one cycle of loads."""
+"""Base of all wear cases: contacts with friction that wear under one cycle of loads."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from workflow.case.fields import shown
 from workflow.case.plain import entries, of_bodies, plain, shares, times
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 
-# What the summary and the results call their own entries.
+# Names of the entries of summary and results, which interfaces must not have.
 RESERVED = (
     *("title", "assumed", "per_length", "cycles", "jumps", "work", "structure", "kinetics"),
     *("surfaces", "warnings", "seconds", "versions", "choice"),
 )
-# Of increments that are auto: those of a leg that leave 1 %, more or less, for seven dovetails, and
-# the most of a cycle that are ever chosen.
+# For automatic increments: the number per leg that leaves an error of about 1 %, from seven
+# dovetails, and the largest number ever chosen for a cycle.
 EXPECTED_INCREMENTS, MOST_INCREMENTS = 11, 1000
 
 
 def check_interface_name(name: str, key: str) -> None:
-    """Refuse, at ``key``, an interface whose name could not stand in the results."""
+    """Refuse, at ``key``, an interface whose name cannot be used in the results."""
     if name in RESERVED or "/" in name:
         raise disagreement(
             f"an interface called {shown(name)}; allowed: names without / and none of "
@@ -50,7 +50,7 @@ def check_interface_name(name: str, key: str) -> None:
 
 @dataclass(frozen=True)
 class ContactTerms:
-    """What a contact of a case is: materials and laws of body 1 and body 2, friction and grid."""
+    """Materials and wear laws of body 1 and body 2, friction and grid of one contact of a case."""
 
     materials: tuple[ElasticMaterial, ElasticMaterial]
     laws: tuple[Worn, Worn]
@@ -59,20 +59,20 @@ class ContactTerms:
 
     @property
     def strained(self) -> tuple[Literal[1, 2], ...]:
-        """Numbers of the bodies that have strains and stresses: of all but a rigid one."""
+        """Numbers of the bodies that have strains and stresses: all but a rigid one."""
         bodies: tuple[Literal[1, 2], ...] = (1, 2)
         return tuple(n for n in bodies if isfinite(self.materials[n - 1].young))
 
 
 class WearCase(WithScans, Case):
-    """One case: where its loads come from, its contacts and how they wear.
+    """Case of a wear run: the source of its loads, its contacts and how they wear.
 
-    Each kind of structure narrows ``structure``, ``materials`` and ``wear`` to its own.
+    Each kind of structure narrows the types of ``structure``, ``materials`` and ``wear``.
     """
 
-    # Names of body 1 and body 2 (sa_solver.types) in the sections that tell them apart.
+    # Names of body 1 and body 2 (sa_solver.types) in the sections that distinguish them.
     bodies: ClassVar[tuple[str, str]] = ("body_1", "body_2")
-    # Whether both are half-spaces by themselves, which for others are a model.
+    # Whether both bodies are true half-spaces; for other structures half-spaces are a model.
     half_spaces: ClassVar[bool] = False
 
     title: Title = entry("one line", "Ti-6Al-4V dovetail, one mission per cycle")
@@ -100,12 +100,12 @@ class WearCase(WithScans, Case):
     )
 
     def material(self, number: int) -> ElasticMaterial:
-        """Material of body ``number``, 1 or 2."""
+        """Return the material of body ``number``, 1 or 2."""
         material: ElasticMaterial = getattr(self.materials, self.bodies[number - 1]).elastic()
         return material
 
     def terms(self, name: str) -> ContactTerms:
-        """What the contact of that name is; all are alike unless a structure says otherwise."""
+        """Return the terms of the named contact; all are equal unless a structure overrides it."""
         return ContactTerms(
             materials=(self.material(1), self.material(2)),
             laws=(self.wear_of(1), self.wear_of(2)),
@@ -115,16 +115,16 @@ class WearCase(WithScans, Case):
 
     @property
     def contact_names(self) -> tuple[str, ...]:
-        """Of contacts as many as differ from each other; one stands for all that are alike."""
+        """One name per distinct contact: a name stands for all contacts with equal terms."""
         return ("",)
 
     @property
     def every_terms(self) -> list[ContactTerms]:
-        """Those of all :attr:`contact_names`."""
+        """Terms of all :attr:`contact_names`."""
         return [self.terms(name) for name in self.contact_names]
 
     def contact_of(self, name: str) -> Contact:
-        """The section ``contact``, with the grid of the contact of that name."""
+        """Return the section ``contact`` with the grid of the contact of that name."""
         return self.contact.model_copy(update={"grid": self.terms(name).grid})
 
     @property
@@ -133,17 +133,17 @@ class WearCase(WithScans, Case):
         return any(terms.friction.evolution is not None for terms in self.every_terms)
 
     def on_one_grid(self) -> Self:
-        """The case with all its contacts on ``contact.grid``."""
+        """Return the case with all its contacts on ``contact.grid``."""
         return self
 
     def wear_of(self, number: int) -> Worn:
-        """Wear law of body ``number``, 1 or 2."""
+        """Return the wear law of body ``number``, 1 or 2."""
         worn: Worn = getattr(self.wear, self.bodies[number - 1])
         return worn
 
     @model_validator(mode="after")
     def _nodes_can_wear(self) -> WearCase:
-        """Refuse what wear of the mesh's own nodes knows nothing of."""
+        """Refuse settings that wear of the mesh's nodes does not support."""
         if self.contact.method != "nodes":
             return self
         if not isinstance(self, FiniteElementCase):
@@ -174,7 +174,7 @@ class WearCase(WithScans, Case):
 
     @abstractmethod
     def loads_outline(self) -> list[tuple[str, str]]:
-        """What structure and loads would run, in a few rows of name and text."""
+        """Return structure and loads of the run in a few rows of name and text."""
 
     def outline(self) -> list[tuple[str, str]]:
         grid, wear = self.contact.grid, self.wear
@@ -200,7 +200,7 @@ class WearCase(WithScans, Case):
         ]
 
     def face_sides(self) -> tuple[float, float] | None:
-        """What the contact grid covers along x and y [mm], where the case itself says it."""
+        """Return the extent of the contact grid along x and y [mm], None if only a mesh has it."""
         return None
 
     def doubts(self) -> Iterator[str]:
@@ -216,18 +216,18 @@ class WearCase(WithScans, Case):
 
     @property
     def recoupling(self) -> Coupling:
-        """How often the worn surfaces go back to the structure: never, where there is none."""
+        """Settings for updating the loads with worn surfaces: never, without a structure."""
         return Coupling(resultants="constant")
 
 
 class FiniteElementCase(WearCase):
-    """A case whose loads come from a structure of ours."""
+    """Case whose loads come from a finite element structure."""
 
     nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
     coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
 
     def told_of_nodes(self) -> Iterator[str]:
-        """What of surfaces as measured is finer than the nodes of the structure."""
+        """Yield remarks on measured surfaces with more detail than the nodes can follow."""
         half_space = "the half-space has all that the grid carries"
         yield from self.finer_than_nodes(
             "nothing has more" if self.contact.method == "nodes" else half_space
@@ -236,21 +236,21 @@ class FiniteElementCase(WearCase):
     @property
     @abstractmethod
     def legs(self) -> tuple[int, ...]:
-        """Increments of each leg of a cycle; 0 where they are auto."""
+        """Number of increments of each leg of a cycle; 0 where it is automatic."""
 
     @abstractmethod
     def divided(self, legs: Sequence[int]) -> dict[str, Any]:
-        """Entries for so many increments in each leg of a cycle."""
+        """Return the case entries for these numbers of increments in the legs of a cycle."""
 
     @property
     def expected_legs(self) -> tuple[int, ...]:
-        """Increments of each leg; where they are auto about as many as will be chosen."""
+        """Number of increments of each leg, with an estimate where it is automatic."""
         each = ceil(EXPECTED_INCREMENTS * sqrt(0.01 / self.wear.tolerance))
         return tuple(count or each for count in self.legs)
 
     @property
     def increments_outline(self) -> str:
-        """How many increments a cycle has, in words."""
+        """Number of increments of a cycle, in words."""
         count = sum(self.expected_legs)
         if any(self.legs):
             return f"{count} increments"
@@ -261,5 +261,5 @@ class FiniteElementCase(WearCase):
 
     @property
     def recoupling(self) -> Coupling:
-        # Where nodes wear, all of the structure is solved in every step.
+        # Where nodes wear, the whole structure is solved in every step.
         return super().recoupling if self.contact.method == "nodes" else self.coupling

@@ -1,4 +1,4 @@
-"""Coefficients that change with the energy dissipated so far, as a case gives them."""
+"""Coefficients that change with the dissipated energy, as sections of a case."""
 
 from __future__ import annotations
 
@@ -50,16 +50,16 @@ class Table(Section):
         return self
 
     def described(self) -> EnergyTable:
-        """As the wear laws take it."""
+        """Return the table as the wear laws take it."""
         return EnergyTable(self.energy, self.factor)
 
 
 class _Scope(Section):
-    scope: str  # named first; each evolution narrows it to its own name
+    scope: str  # first in the section; each evolution narrows it to its own name
 
 
 class _WearEvolution(Table, _Scope):
-    """A wear coefficient against energy, and the energy that it takes to begin with."""
+    """A wear coefficient against energy, with the energy needed before wear starts."""
 
     threshold: float  # each scope narrows it to its own unit
 
@@ -68,7 +68,7 @@ class _WearEvolution(Table, _Scope):
 
 
 class LocalEvolution(_WearEvolution):
-    """The coefficient against the energy per area of this body's own surface, place by place."""
+    """The coefficient at each place against the local energy per area of this body's surface."""
 
     scope: Literal["local"] = entry("local, by place, or global, of the whole contact", "local")
     energy: tuple[EnergyPerArea, ...] = entry(

@@ -1,4 +1,4 @@
-"""Gap of the unloaded bodies over a contact face, as a case gives it."""
+"""Gap of the unloaded bodies over a contact face, as sections of a case."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from workflow.case.sections import (
     together,
 )
 
-# Share of a face's size that is rounding.
+# Relative tolerance for rounding errors of a face's size.
 ROUNDING = 1e-9
 
 
 class RoundedGap(Section):
-    """Flat, with rounded edges along x and rounded ends along y."""
+    """Gap of a flat face with rounded edges along x and rounded ends along y."""
 
     in_schema: ClassVar[Mapping[str, Any]] = together("end_width", "end_radius")
 
@@ -45,7 +45,7 @@ class RoundedGap(Section):
 
 
 def check_arcs(face: Section) -> None:
-    """Refuse half of a rounded end of a face, and any rounding that is wider than its radius."""
+    """Refuse a rounded end with only one of its entries, and a rounding wider than its radius."""
     given = [key for key in ("end_width", "end_radius") if getattr(face, key) is not None]
     if len(given) == 1:
         raise disagreement(
@@ -62,7 +62,7 @@ def check_arcs(face: Section) -> None:
 
 
 class ParaboloidGap(Section):
-    """Paraboloid x² / 2 Rx + y² / 2 Ry; straight along x or y where there is no radius."""
+    """Paraboloid gap x² / 2 Rx + y² / 2 Ry; straight along an axis without a radius."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("radius_x", "radius_y")
     in_schema: ClassVar[Mapping[str, Any]] = one_of("radius_x", "radius_y")
@@ -83,7 +83,7 @@ class ParaboloidGap(Section):
 
 
 class HeightsGap(Section):
-    """Gap from a file, a value for every cell of ``contact.grid``."""
+    """Gap from a file, with one value for every cell of ``contact.grid``."""
 
     shape: Literal["heights"] = entry("rounded, paraboloid or heights", "heights")
     file: Annotated[str, File((".npy", ".csv", ".h5"))] = entry(
@@ -103,9 +103,9 @@ def check_gap(
     key: str,
     *beside: str,
 ) -> None:
-    """Refuse, at ``key``, what does not fit a face of ``size`` [mm] or the ``cells`` of its grid.
+    """Refuse, at ``key``, a gap that does not fit a face of ``size`` [mm] or its ``cells``.
 
-    ``beside`` are other entries that say how large the face is.
+    ``beside`` names the other entries that set the size of the face.
     """
     match gap:
         case RoundedGap():
@@ -122,7 +122,7 @@ def check_gap(
 
 
 def check_cells(shape: tuple[int, ...], file: str, cells: tuple[int, int]) -> None:
-    """Refuse heights of another shape than the contact grid's."""
+    """Refuse heights whose shape is not that of the contact grid."""
     if shape != cells:
         raise disagreement(
             f"{cells[0]} x {cells[1]} cells: the heights of {file} are {shape[0]} x {shape[1]}; "
@@ -134,7 +134,7 @@ def check_cells(shape: tuple[int, ...], file: str, cells: tuple[int, int]) -> No
 def _check_roundings(
     gap: RoundedGap, size: tuple[float, float], line: bool, key: str, *beside: str
 ) -> None:
-    """Roundings lie within the face."""
+    """Refuse roundings that do not fit into the face."""
     widths: dict[str, tuple[float | None, float]] = {"edge_width": (gap.edge_width, size[0])}
     if not line:
         widths["end_width"] = gap.end_width, size[1]

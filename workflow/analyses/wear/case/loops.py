@@ -1,4 +1,4 @@
-"""Tangential loops on worn contacts: the section that asks for them."""
+"""The section of a case that requests tangential loops on worn contacts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LoopForce = Annotated[float, Quantity("N", above=0.0, at_most=1e9, range_text="a
 
 
 class Loops(Section):
-    """A tangential loop now and then: kt, µ and energy against wear, for joint laws to read.
+    """Tangential loops during wear: kt, µ and energy against wear, as input of joint laws.
 
     There are none unless ``amplitude`` or ``force`` is given.
     """
@@ -46,11 +46,11 @@ class Loops(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether there are any."""
+        """Whether any loops are requested."""
         return self.amplitude is not None or self.force is not None
 
     def described(self) -> TangentialLoops | None:
-        """Return the loops as the model takes them; None where there are none."""
+        """Return the loops as the model takes them, or None if none are requested."""
         if not self.wanted:
             return None
         from workflow.models.loops import TangentialLoops

@@ -1,4 +1,4 @@
-"""Surfaces as measured on the contact faces of a wear case, beside the form of these."""
+"""Measured surfaces on the contact faces of a wear case, in addition to their nominal form."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ if TYPE_CHECKING:
     from fe_models.meshes.transfer import FaceTransfer
     from workflow.models.gaps import GapFunction
 
-# Cells along a facet at least: with one and a half of them nodal forces under a cylinder were up to
-# 4 % of the largest off, with four 0.02 %. Their steps leave a hundredth of the rise over a facet.
+# Least number of cells per facet. With 1.5 cells, nodal forces under a cylinder had errors of up to
+# 4 % of the largest force, with 4 cells 0.02 %. The steps between cells cause an error of a
+# hundredth of the rise over a facet.
 IN_A_FACET = 8
-# Heights on both sides of a plane of symmetry may differ by this share of their range: files round.
+# Heights may differ by this share of their range across a symmetry plane, as files are rounded.
 MIRRORED = 1e-6
 
 
 @dataclass(frozen=True)
 class ScannedFace:
-    """A contact of this ``name`` whose entry ``key`` has ``surfaces``, and its ``grid``.
+    """A contact ``name`` with measured ``surfaces``, given at the entry ``key``, and its ``grid``.
 
-    ``face`` has the nodes on which a structure of ours meets, which planes of symmetry may cut; the
-    grid covers the whole of it. None without one.
+    ``face`` has the nodes of a finite element structure, and planes of symmetry may cut it; the
+    grid covers the whole face. It is None without a structure.
     """
 
     name: str
@@ -43,24 +44,25 @@ class ScannedFace:
     face: Interface | None = None
 
     def at_nodes(self) -> Array:
-        """What they add to the gap at the nodes ``(n,)`` [mm], as near as facets come to it.
+        """Return the surfaces' part of the gap at the nodes ``(n,)`` [mm], fitted with the facets.
 
-        Means under the nodes' shape functions are kept, as those of cells are on a grid.
+        The fit preserves means under the shape functions of the nodes, as a grid preserves cell
+        means.
         """
         assert self.face is not None
-        # Of a whole face the nodes of the part that is meshed come first.
+        # The nodes of the meshed part come first among those of the whole face.
         return self._fine.fitted(self.surfaces.gap(self._fine.grid))[: len(self.face)]
 
     @property
     def over(self) -> GapFunction:
-        """The gap of the surfaces on the cells of any grid over the face."""
+        """Gap of the surfaces on the cells of any grid over the face."""
         from workflow.analyses.wear.gaps import MeasuredHeights
 
         return MeasuredHeights(self.surfaces, self.grid)
 
     @cached_property
     def _fine_grid(self) -> Grid:
-        """One so fine that the steps of its cells hardly count beside the facets."""
+        """Grid so fine that the steps between its cells are negligible compared with the facets."""
         face, grid = self.face, self.grid
         assert face is not None
         facets = np.median(np.ptp(face.coordinates[face.facets], axis=1), axis=0)
@@ -70,7 +72,7 @@ class ScannedFace:
 
     @cached_property
     def _fine(self) -> FaceTransfer:
-        """From that grid to the nodes of the whole face."""
+        """Transfer from the fine grid to the nodes of the whole face."""
         from fe_models.meshes.cut_face import whole_face
         from fe_models.meshes.transfer import FaceTransfer
 
@@ -78,7 +80,7 @@ class ScannedFace:
         return FaceTransfer.between(whole_face(self.face), self._fine_grid)
 
     def check_mirrored(self) -> None:
-        """Refuse those that are not their own image across the planes that cut the face."""
+        """Refuse surfaces that are not symmetric about the planes that cut the face."""
         face = self.face
         if face is None or not face.planes:
             return
@@ -95,7 +97,7 @@ class ScannedFace:
                     )
 
     def summary(self) -> dict[str, Any]:
-        """Numbers of each body's, in base units; with nodes, what these do not carry."""
+        """Return the numbers of each body's surface, in base units, and the part lost at nodes."""
         numbers = self.surfaces.summary(self.grid)
         if self.face is not None:
             for name, on in self.surfaces.on(self._fine_grid).items():
@@ -103,21 +105,21 @@ class ScannedFace:
         return numbers
 
     def _lost_by_nodes(self, heights: Array) -> float:
-        """Root mean square [mm] of ``heights`` ``(nx, ny)`` that the facets do not follow."""
+        """Return the rms [mm] of the part of ``heights`` ``(nx, ny)`` that facets do not follow."""
         left = heights - self._fine.to_cells(self._fine.fitted(heights))
         return rms(np.where(self._fine.inside, left, np.nan))
 
     def outline(self) -> Iterator[tuple[str, str]]:
-        """A row for each body's surface."""
+        """Yield a row for each body's surface."""
         for name, text in self.surfaces.told(self.summary()).items():
             yield f"surface {name.removeprefix('body_')}", f"{self.name}: {text}"
 
     def doubts(self) -> Iterator[str]:
-        """About units, and a grid that does not carry the roughness."""
+        """Yield plausibility warnings about units and a grid too coarse for the roughness."""
         yield from self.surfaces.doubts(self.grid, self.key)
 
     def finer_than_nodes(self, rest: str) -> Iterator[str]:
-        """What the nodes of the structure do not carry; ``rest`` says what does."""
+        """Yield a remark on each surface finer than the nodes; ``rest`` says what resolves it."""
         for name, numbers in self.summary().items():
             lost, height = numbers["lost_by_nodes"], numbers["rms"]
             if lost > LOST * height:
@@ -129,23 +131,23 @@ class ScannedFace:
 
 
 class WithScans:
-    """What cases tell of contact faces that have surfaces as measured; they are none here."""
+    """Reports of a case on faces with measured surfaces; by default there are none."""
 
     def scanned(self) -> Iterator[ScannedFace]:
-        """These faces."""
+        """Yield the faces with measured surfaces."""
         yield from ()
 
     def told_surfaces(self) -> dict[str, Any]:
-        """What the summary has of surfaces as measured; nothing where there are none."""
+        """Return the summary's entry on measured surfaces; empty if there are none."""
         faces = {face.name: face.summary() for face in self.scanned()}
         return {"surfaces": faces} if faces else {}
 
     def surface_doubts(self) -> Iterator[str]:
-        """About surfaces as measured, for a run to warn of."""
+        """Yield the plausibility warnings about measured surfaces."""
         for face in self.scanned():
             yield from face.doubts()
 
     def finer_than_nodes(self, rest: str) -> Iterator[str]:
-        """What of them is finer than the nodes of a structure; ``rest`` says what has it."""
+        """Yield remarks on surfaces finer than the nodes; ``rest`` says what resolves them."""
         for face in self.scanned():
             yield from face.finer_than_nodes(rest)

@@ -1,4 +1,4 @@
-"""What every wear case has: materials, contact, laws and steps of wear, coupling."""
+"""Sections that all wear cases have: materials, contact, laws and steps of wear, coupling."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ PressingForce = Annotated[
 ]
 Place = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4)]
 
-# Shares add up to 1 but for the rounding of what was written.
+# Tolerance on the sum of shares, which is 1 except for rounding in the case file.
 SHARES_APART = 1e-6
 
 
 def check_shares(shares: Sequence[float]) -> None:
-    """Refuse a mix of missions that are not all cycles together, or more."""
+    """Refuse a mix of missions whose shares do not add up to 1."""
     if abs(sum(shares) - 1.0) > SHARES_APART:
         raise disagreement(f"shares that add up to {sum(shares):g}; allowed: to 1", "mix")
 
@@ -70,7 +70,7 @@ class BladeAndDisk(Section, Generic[Part]):
 
 
 class TwoBodies(Section, Generic[Part]):
-    """The two bodies of any other structure."""
+    """The two bodies of a structure other than a dovetail."""
 
     body_1: Part = entry("the lower, fixed body")
     body_2: Part = entry("the upper, moving body")
@@ -132,7 +132,7 @@ class Contact(Section):
 
 
 def check_rows(grid: tuple[int, int], line: bool, key: str | None = None) -> None:
-    """Refuse, at ``key``, a single row of cells where a contact is no line."""
+    """Refuse, at ``key``, a single row of cells in a contact that is not a line contact."""
     if grid[1] == 1 and not line:
         raise disagreement(
             f"{grid[0]}: of line contacts; allowed: [x, y], cells along both",
@@ -141,7 +141,7 @@ def check_rows(grid: tuple[int, int], line: bool, key: str | None = None) -> Non
 
 
 class Step(Section):
-    """How a wear step is made, and its size; without one it is chosen by an error estimate."""
+    """Kind and size of a wear step; without a size, an error estimate chooses it."""
 
     filled_in: ClassVar[bool] = False
 
@@ -183,7 +183,7 @@ class Step(Section):
 
 
 class Stop(Section):
-    """Ends the run before its cycles are over, at the first of these that is reached to 0.1 %."""
+    """Limits that end the run before its cycles are over; the first is reached to within 0.1 %."""
 
     depth: Length | None = entry("largest depth of either body [mm]", "0.5 mm", default=None)
     volume: Volume | None = entry(
@@ -192,9 +192,9 @@ class Stop(Section):
 
 
 class Duration(Section):
-    """What every wear law needs."""
+    """Length, steps and tolerances of wear, for every wear law."""
 
-    law: str  # named first in every wear section; each law narrows it to its own name
+    law: str  # first in every wear section; each law narrows it to its own name
     cycles: Cycles = entry("of the whole run [1]", 3e5)
     step: Step = entry("how far one wear step jumps", default=Step())
     tolerance: Annotated[float, Quantity("1", above=0.0, at_most=1.0)] = entry(
@@ -231,7 +231,7 @@ class Duration(Section):
 
 
 class Laws(Section):
-    """A law for both bodies, unless one has its own."""
+    """Wear law of both bodies; a body may name another one."""
 
     law: LawName = entry("energy, energy_amplitude or archard; a body may name its own", "energy")
     reference_amplitude: Length | None = entry(
@@ -241,12 +241,12 @@ class Laws(Section):
     @model_validator(mode="before")
     @classmethod
     def _fill_in_laws(cls, data: Any) -> Any:
-        """Give the bodies that name no law of their own that of this section."""
+        """Give the law of this section to the bodies that do not name one."""
         if not isinstance(data, dict):
             return data
         law: Any = data.get("law")
         if law not in get_args(LawName):
-            # As pydantic says it of a section that is one of several kinds.
+            # This is pydantic's message for a section that is one of several kinds.
             context = {"discriminator": "law"}
             raise PydanticCustomError("union_tag_invalid", "{discriminator}", context)
         bodies = {name: data[name] for name in cls._names() if name in data}
@@ -274,25 +274,25 @@ class Laws(Section):
 
     @classmethod
     def _names(cls) -> list[str]:
-        """The keys of the two bodies."""
+        """Return the keys of the two bodies."""
         pairs = [pair for pair in (BladeAndDisk, TwoBodies) if issubclass(cls, pair)]
         return [name for pair in pairs for name in pair.model_fields]
 
 
 class BodiesThatWear(Laws, Duration):
-    """Laws of both bodies, and how far they wear."""
+    """Wear laws of both bodies, and length of the run."""
 
 
 class DovetailWear(BladeAndDisk[BodyWear], BodiesThatWear):
-    """Wear of blade and disk, and how far it goes."""
+    """Wear laws of blade and disk, and length of the run."""
 
 
 class Wear(TwoBodies[BodyWear], BodiesThatWear):
-    """Wear of two bodies, and how far it goes."""
+    """Wear laws of two bodies, and length of the run."""
 
 
 class Nonlinearity(Section):
-    """What large displacements change: small for stiff joints, and measured by the check."""
+    """Geometric nonlinearity: its effect is small for stiff joints, and the check measures it."""
 
     stiffness: Literal["linear", "stress_stiffened", "relinearised"] = entry(
         "linear; stress_stiffened: with the stress and spin of peak load; relinearised: tangent to "
@@ -308,19 +308,19 @@ class Nonlinearity(Section):
 
     @property
     def asked(self) -> tuple[str, ...]:
-        """The entries that ask for more than a linear structure."""
+        """Keys of the entries that request more than a linear structure."""
         beyond = {"stiffness": self.stiffness != "linear", "check": self.check}
         return tuple(key for key, asks in beyond.items() if asks)
 
     def described(self) -> structure.Nonlinearity:
-        """Return it as the model takes it."""
+        """Return the settings as the model takes them."""
         from workflow.models import structure
 
         return structure.Nonlinearity(self.stiffness, self.check)
 
 
 class Coupling(Section):
-    """How often the worn surfaces go back to the structure."""
+    """How often the loads are computed again with the worn surfaces."""
 
     resultants: Literal["constant", "drift", "every"] = entry(
         "constant: of the unworn structure; drift: computed again when wear changes them; every: "
@@ -384,5 +384,5 @@ class ContactStress(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether there is anything to compute."""
+        """Whether any stress has to be computed."""
         return self.section != "none" or self.life.parameter != "none"

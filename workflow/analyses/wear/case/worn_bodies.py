@@ -1,4 +1,4 @@
-"""Wear of one body as a case gives it: a section for every law."""
+"""Wear of one body: a section of the case for every law."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ LawName = Literal["energy", "energy_amplitude", "archard"]
 
 
 class Worn(Section):
-    """What the wear of a body may have, whatever its law."""
+    """Wear of one body, whatever its law."""
 
-    law: str  # named first; each law narrows it to its own name
+    law: str  # first in the section; each law narrows it to its own name
     evolution: Evolution | None = entry(
         "of the coefficient with dissipated energy; without it none", default=None
     )
 
     def described(self) -> WearLaw:
-        """As the wear steps take it."""
+        """Return the wear law as the wear steps take it."""
         law = self._base()
         if self.evolution is None:
             return law
@@ -45,11 +45,11 @@ class Worn(Section):
 
     @abstractmethod
     def rate(self, friction: float) -> float:
-        """Worn volume over load and sliding distance, without evolution [1/MPa]."""
+        """Return worn volume per load and sliding distance, without evolution [1/MPa]."""
 
     @abstractmethod
     def _base(self) -> WearLaw:
-        """The law without its evolution."""
+        """Return the law without its evolution."""
 
 
 class EnergyBody(Section):
@@ -67,8 +67,8 @@ class EnergyBody(Section):
     )
 
 
-# A body that names no law has that of the section around it, which is filled in before it is read
-# (wear_sections.BodiesThatWear): the defaults of ``law`` are never seen.
+# A body that names no law gets that of the section around it, before validation
+# (:class:`workflow.analyses.wear.case.sections.Laws`); the defaults of ``law`` are never used.
 
 
 class WornByEnergy(Worn, EnergyBody):
@@ -106,7 +106,7 @@ class WornByEnergyAmplitude(Worn, EnergyBody):
 
 
 class WornByArchard(Worn):
-    """Depth = k x pressure x slip, with k = K / H: either K and H are given, or k."""
+    """Depth = k x pressure x slip, with k = K / H: give K and H, or k."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("coefficient", "hardness")
 
@@ -136,7 +136,7 @@ class WornByArchard(Worn):
     @model_validator(mode="before")
     @classmethod
     def _is_no_rate(cls, data: Any) -> Any:
-        """Refuse k in the place of K, by its dimension."""
+        """Refuse a specific wear rate k given as coefficient K, recognised by its dimension."""
         written = data.get("coefficient") if isinstance(data, dict) else None
         if isinstance(written, str):
             with suppress(units.UnitError, ArithmeticError):
@@ -189,7 +189,7 @@ class WornByArchard(Worn):
 
 
 def wearing(bodies: Mapping[str, Worn]) -> list[tuple[str, str]]:
-    """Rows of an outline with the law of each body, by name, and its coefficients."""
+    """Return outline rows with the law and coefficients of each body, by name."""
     texts = {}
     for name, body in bodies.items():
         changes = "" if body.evolution is None else ", changing with dissipated energy"
@@ -198,7 +198,7 @@ def wearing(bodies: Mapping[str, Worn]) -> list[tuple[str, str]]:
 
 
 class _LawMayBeLeftOut:
-    """In the JSON schema a body without a law may suit more than one of them."""
+    """Schema change: a body without a law may match more than one law, so ``anyOf`` is used."""
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -215,7 +215,7 @@ BodyWear = Annotated[
 
 
 def with_laws(bodies: dict[str, object], law: str, amplitude: object) -> dict[str, object]:
-    """The plain data of ``bodies``, each with what it leaves to the section around it."""
+    """Return the plain data of ``bodies``, with missing laws and amplitudes filled in."""
     filled: dict[str, object] = {}
     for name, body in bodies.items():
         if isinstance(body, dict):

@@ -1,1 +1,1 @@
-"""The cheapest model that meets the accuracy that a case asks for (``fidelity: auto``)."""
+"""Choice of the cheapest model that meets the accuracy of a case (``fidelity: auto``)."""

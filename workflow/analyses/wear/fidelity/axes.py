@@ -1,8 +1,9 @@
-"""The axes of fidelity after the dimension: how fine each setting must be for its share of error.
+"""Axes of fidelity after the dimension: how fine each setting must be for its share of the error.
 
-Shares are large where accuracy is dear: of increments and wear steps the cost goes with the root of
-the error, of meshes in space with its fourth power. They add up to 1; errors of all axes are taken
-to have one sign. Estimates are of the largest depth and the volume of either flank.
+Shares are large where accuracy is costly: the cost of increments and wear steps grows with the root
+of 1 / error, that of meshes in space with the fourth power of this root. The shares add up to 1,
+and the errors of all axes are assumed to have the same sign. Estimates are those of the largest
+depth and of the volume of either flank.
 """
 
 from __future__ import annotations
@@ -27,36 +28,38 @@ from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import section_joint
 from workflow.case.changing import changed
 
-# What meshes and grids are of at most.
+# Highest order of convergence of meshes and grids.
 ORDER = 2.0
-# Elements across a flank: fewer say nothing, and so many take seconds to condense in the plane.
-# In space the time grows with the fourth power: a mesh is never made finer than the case has it.
+# Elements across a flank: fewer give no useful estimate, and the largest number takes seconds to
+# condense in the plane. In space the time grows with the fourth power, so the mesh is never made
+# finer than that of the case.
 FEWEST_ELEMENTS, MOST_ELEMENTS = 7, 160
-# Cells of a contact grid along one direction: fewer hardly show a contact. In the plane so many may
-# be chosen; in space, where each doubling takes four times as long, twice those of the case. None
-# is coarser than that of the case by more than the last.
+# Cells of a contact grid along one direction. Fewer hardly resolve a contact. The largest number
+# holds in the plane; in space, where each doubling takes four times as long, the limit is this
+# factor times the case's number. No grid is coarser than the case's by more than the last factor.
 FEWEST_CELLS, MOST_STRIPS, FINER_SPACE, COARSER = 16, 512, 2, 4
-# Rungs of a ladder that are probed before any is chosen: an order takes three.
+# Rungs of a ladder that are probed before a choice: an order of convergence needs three.
 LEAST_RUNGS = 3
-# The contact solver's tolerance left at most 0.35 of itself as error of depth and volume, for
-# tolerances from 1e-3 to 1e-6 on two dovetails' flanks. So its share is its tolerance; no looser
-# ones than the loosest were measured.
+# The contact solver's tolerance caused errors of at most 0.35 of itself in depth and volume, for
+# tolerances from 1e-3 to 1e-6 on the flanks of two dovetails. So the tolerance is set to its share
+# of the error, and to no more than the loosest measured one.
 LOOSEST_TOLERANCE, LEFT_BY_TOLERANCE = 1e-3, 0.5
-# Steps of an automatic tolerance 0.1, 0.01, 0.003, 0.001 left 1.2, 0.4, 0.23, 0.08 % of the largest
-# depth on the section of the default joint and less of the volume; 1.4, 0.27, 0.13, 0.07 % where
-# flanks carry differently over 1e6 cycles: never more than themselves. Looser are hardly quicker.
+# Steps with an automatic tolerance of 0.1, 0.01, 0.003 and 0.001 caused errors of 1.2, 0.4, 0.23
+# and 0.08 % of the largest depth on the section of the default joint, less of the volume, and 1.4,
+# 0.27, 0.13 and 0.07 % where flanks carry different loads over 1e6 cycles: never more than the
+# tolerance. Looser tolerances are hardly faster.
 LOOSEST_STEPS = 0.1
-# Drift below this is rounding of the structure's solver.
+# A drift below this is rounding of the structure's solver.
 LEAST_DRIFT = 1e-4
-# An error that is its share but for rounding is within it.
+# Relative tolerance on an error that equals its share except for rounding.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An approximation: its main ``entry``, its ``share`` of the accuracy, and who decides.
+    """An approximation: its main ``entry``, its ``share`` of the accuracy and its decision.
 
-    ``decide`` is given the case as the axes before it left it, and the error that it may make.
+    ``decide`` takes the case with the decisions of earlier axes, and the error that it may cause.
     """
 
     entry: str
@@ -68,7 +71,7 @@ class Axis:
 
 
 def choose_increments(case: DovetailCase, allowed: float) -> Decision:
-    """As many increments as the cycle of the section asks for."""
+    """Choose the increments that the cycle of the section needs."""
     return decide_increments(case, section_joint, allowed)
 
 
@@ -77,9 +80,9 @@ def choose_increments(case: DovetailCase, allowed: float) -> Decision:
 
 @dataclass(frozen=True)
 class _Rung:
-    """A setting ``size`` times as fine as another; ``offered`` unless it is only to compare with.
+    """A setting of fineness ``size`` with its case entries ``settings``.
 
-    ``settings`` are its entries.
+    ``offered`` is false for a rung that serves only as a reference.
     """
 
     size: int
@@ -89,7 +92,7 @@ class _Rung:
 
 @dataclass(frozen=True)
 class _Climb:
-    """The rung that was ``taken``, and what the ``probed`` ones gave."""
+    """The rung that was ``taken``, with its error, and the results of the ``probed`` rungs."""
 
     taken: _Rung
     error: float
@@ -98,7 +101,7 @@ class _Climb:
 
 
 def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
-    """The coarsest mesh, along and away in proportion, whose section wears as it should."""
+    """Choose the coarsest mesh, refined in proportion, whose section wears accurately enough."""
     climb = _climb(list(_meshes(case)), partial(_worn, plane_section(case)), allowed)
     why = _sentence(climb, allowed, "elements across the flank")
     return _decision(climb.taken.settings, why, climb.probed, allowed, climb.error)
@@ -108,7 +111,7 @@ def _meshes(case: DovetailCase) -> Iterator[_Rung]:
     across, along = case.mesh.flank_nodes
     in_space = case.structure.dimension == 3
     written = across - 1
-    # Rungs beyond those that are offered say how good the finest of these is.
+    # Finer rungs that are not offered serve to estimate the error of the finest offered one.
     most = 4 * written if in_space else max(written, MOST_ELEMENTS)
     for elements in _doublings(written, FEWEST_ELEMENTS, most):
         factor = elements / written
@@ -120,7 +123,7 @@ def _meshes(case: DovetailCase) -> Iterator[_Rung]:
 
 
 def choose_grid(case: DovetailCase, allowed: float) -> Decision:
-    """The coarsest grid across the flank, and along the slot, whose line contact wears alike."""
+    """Choose the coarsest grids across the flank and along the slot that are accurate enough."""
     section = plane_section(case)
     across, along = case.contact.grid
     in_space = case.structure.dimension == 3
@@ -144,13 +147,13 @@ def _worn(section: DovetailCase, rung: _Rung) -> Numbers:
 
 
 def _climb_grid(cells: int, most: int, allowed: float, worn: Callable[[_Rung], Numbers]) -> _Climb:
-    """Up the halves and doubles of so many cells."""
+    """Climb the ladder of halves and doubles of ``cells``."""
     sizes = _doublings(cells, max(FEWEST_CELLS, cells // COARSER), most)
     return _climb([_Rung(n, {"contact.grid": (n, n)}) for n in sizes], worn, allowed)
 
 
 def _doublings(count: int, fewest: int, most: int) -> list[int]:
-    """Halves and doubles of a count, coarse to fine, itself among them."""
+    """Return halves and doubles of ``count``, coarse to fine, including itself."""
     sizes = [count]
     while (half := round(0.5 * sizes[0])) >= fewest:
         sizes.insert(0, half)
@@ -160,7 +163,7 @@ def _doublings(count: int, fewest: int, most: int) -> list[int]:
 
 
 def _climb(rungs: Sequence[_Rung], worn: Callable[[_Rung], Numbers], allowed: float) -> _Climb:
-    """Probe ever finer rungs until one of them is good enough; the finest offered if none is."""
+    """Probe ever finer rungs until one is accurate enough, or else take the finest offered."""
     values: list[Numbers] = []
     for rung in rungs:
         values.append(worn(rung))
@@ -189,7 +192,7 @@ def _sentence(climb: _Climb, allowed: float, unit: str) -> str:
 
 
 def choose_tolerance(case: DovetailCase, allowed: float) -> Decision:
-    """The contact solver's tolerance is its share: it leaves less."""
+    """Choose the share of the error as tolerance of the contact solver, whose error is smaller."""
     tolerance = max(min(allowed, LOOSEST_TOLERANCE), 1e-12)
     why = "its share: depth and volume were found within half of it"
     error = LEFT_BY_TOLERANCE * tolerance
@@ -197,7 +200,7 @@ def choose_tolerance(case: DovetailCase, allowed: float) -> Decision:
 
 
 def choose_steps(case: DovetailCase, allowed: float) -> Decision:
-    """Automatic implicit steps, whose tolerance is their share."""
+    """Choose automatic implicit steps, with the share of the error as their tolerance."""
     tolerance = min(allowed, LOOSEST_STEPS)
     settings = {
         "wear.tolerance": tolerance,
@@ -210,7 +213,7 @@ def choose_steps(case: DovetailCase, allowed: float) -> Decision:
 
 
 def choose_drift(case: DovetailCase, allowed: float) -> Decision:
-    """The drift at which two lives, coupled and not, would differ by the share."""
+    """Choose the drift at which coupled and uncoupled probe runs would differ by the share."""
     coupling = case.coupling
     if coupling.resultants == "constant":
         why = "resultants stay those of the unworn structure, as the case has it"
@@ -218,7 +221,7 @@ def choose_drift(case: DovetailCase, allowed: float) -> Decision:
     section = plane_section(case)
     apart = life(section)
     coupled, drift = coupled_life(section)
-    # Loads that follow at the end of a step miss half of it: of a steady drift, one step of all.
+    # Loads updated at the end of each step lag by half a step, one step in all for a steady drift.
     effect = _effect(apart, coupled) * STEPS / (STEPS - 1)
     bounded = max(LEAST_DRIFT, min(1.0, drift * allowed / effect)) if effect > 0.0 else 1.0
     settings = {"coupling.drift": bounded, "coupling.resultants": "drift"}
@@ -232,9 +235,9 @@ def choose_drift(case: DovetailCase, allowed: float) -> Decision:
 
 
 def _effect(apart: Numbers, coupled: Numbers) -> float:
-    """Largest relative difference of two lives."""
+    """Return the largest relative difference of two probe runs."""
     pair = estimate([apart, coupled], [2.0, 1.0], ORDER)
-    # Of two rungs the last one's error is their difference, and the first one's twice that.
+    # Of two rungs, the last error is their difference and the first is twice that.
     return pair.errors[-1]
 
 

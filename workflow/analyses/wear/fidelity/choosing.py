@@ -1,9 +1,9 @@
-"""The cheapest model that meets the accuracy that a case asks for (``fidelity: auto``).
+"""Choice of the cheapest model that meets the accuracy of a case (``fidelity: auto``).
 
-Every axis along which a model can be cheaper is a function that looks at the case, probes if it
-must, and returns a decision. Axes are decided one after the other, each on the case that the
-earlier ones left, each with its share of the accuracy: what two dimensions make of it goes first,
-the rest is shared out (:data:`AXES`), and the shares add up to it.
+Each axis along which a model can be cheaper is a function that examines the case, runs probes if
+necessary, and returns a decision. Axes are decided one after the other, each on the case with the
+earlier decisions applied and each with its share of the accuracy. The error of two dimensions is
+subtracted first; the rest is divided among the axes (:data:`AXES`) by shares that add up to 1.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from workflow.case.changing import changed
 
 
 def choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any]]:
-    """The case to run, and a record of what was chosen and why."""
+    """Return the case to run, and a record of the choices and their reasons."""
     begin = time.perf_counter()
     if not any(case.legs):
-        case = changed(case, case.divided(LEGS))  # until they are decided
+        case = changed(case, case.divided(LEGS))  # until the axis of increments is decided
     first = choose_dimension(case)
     decisions = [replace(first, seconds=since(begin))]
     case = changed(case, first.chosen)
@@ -38,7 +38,7 @@ def choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any]]:
 
 
 def _decide(axis: Axis, case: DovetailCase, allowed: float) -> Decision:
-    """What an axis decides; the setting of the case where its probe fails."""
+    """Return the decision of an axis, or the case's own setting if its probe fails."""
     begin = time.perf_counter()
     try:
         decision = axis.decide(case, allowed)

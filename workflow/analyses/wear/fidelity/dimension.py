@@ -1,4 +1,4 @@
-"""Two dimensions or three: a coarse probe of a dovetail's mid-slot says which."""
+"""Choice between two and three dimensions by a coarse probe of a dovetail's mid-slot."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from workflow.analyses.wear.uniformity import sections
 from workflow.errors import MethodFailed
 
 ENTRY = "structure.dimension"
-# The probe's mesh: nodes across a flank, and rows along it on each stretch as long as it is wide.
-# On the default joint meshes from 6 x 16 to 20 x 34 nodes agree on the differences between two and
-# three dimensions within 1 % of the values under the pull alone, and within 2 % under the moment,
-# but for slip and energy of the lesser flank, which scatter by 4 %. Fewer rows blur the ends.
+# Mesh of the probe: nodes across a flank, and rows along it per width of the flank. On the default
+# joint, meshes from 6 x 16 to 20 x 34 nodes agree on the differences between two and three
+# dimensions within 1 % of the values under the pull alone, and within 2 % under the moment, except
+# for slip and energy of the lesser flank, which scatter by 4 %. Fewer rows blur the ends.
 NODES_ACROSS = 8
 ROWS_PER_WIDTH = 3
-# The most that two dimensions may use of the accuracy: the other approximations need some of it.
+# Largest share of the accuracy that two dimensions may use: other approximations need the rest.
 MOST_USED = 0.9
 
 
 def choose_dimension(case: DovetailCase) -> Decision:
-    """Plane strain where it gives the mid-slot values of three dimensions within the accuracy.
+    """Choose plane strain if it gives the mid-slot values of three dimensions accurately.
 
     The values are P and Qx at peak load, the mean slip and the energy of a closed cycle, all per
-    length and in mid-slot, of the unworn structure on coarse meshes with one and the same section.
-    Wear is in proportion to that energy.
+    length and in mid-slot, of the unworn structure on coarse meshes with the same section. Wear is
+    proportional to that energy.
     """
     if case.structure.skew != 0.0:
         return Decision(ENTRY, 3, "a skewed slot is not the same all along")
@@ -57,7 +57,7 @@ def choose_dimension(case: DovetailCase) -> Decision:
 
 
 def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
-    """What the sections in mid-slot carry on every flank, on a coarse mesh."""
+    """Return the mid-slot values of every flank on a coarse mesh."""
     width, length = case.structure.face_width, case.structure.slot_length
     nodes = NODES_ACROSS, 1 + ceil(ROWS_PER_WIDTH * length / width)
     coarsest = {"flank_nodes": nodes, "size": width, "notch": NOTCH, "order": 1}
@@ -74,7 +74,7 @@ def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
 
 
 def _differences(two: Numbers, three: Numbers, friction: float) -> Numbers:
-    """Relative differences of every quantity on every flank; those of Qx relative to µP."""
+    """Return relative differences of all quantities on all flanks; Qx is relative to µP."""
     differences: Numbers = {}
     for flank, relative_to in scales(three).items():
         relative_to["Qx"] = friction * relative_to["P"]

@@ -1,4 +1,4 @@
-"""How far each rung of a probe's ladder is from the limit that the ladder goes to."""
+"""Error of each rung of a probe's ladder, relative to the limit of refinement."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from workflow.shell.convergence import richardson
 
 Numbers = dict[str, dict[str, float]]  # by interface and quantity
 
-# A flank that carries, dissipates or wears less than this share of the other's is measured by that
-# share.
+# A flank that carries, dissipates or wears less than this share of the other is measured relative
+# to that share.
 LESSER_FLANK = 0.1
-# An order that is taken for granted beyond the probed rungs where these show none.
+# Order that is assumed beyond the probed rungs if these show none.
 LEAST_ORDER = 0.5
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """Relative ``errors`` of one quantity on every rung, and the ``order`` they fall with."""
+    """Relative ``errors`` of one quantity on every rung, and their ``order`` of convergence."""
 
     name: str
     errors: tuple[float, ...]
     order: float
 
     def beyond(self, refinement: float) -> float:
-        """Error at a step shorter than the last one by a factor (longer: below 1)."""
+        """Return the error at a step shorter than the last by the factor ``refinement``."""
         return self.errors[-1] / refinement**self.order
 
     def refinement(self, allowed: float) -> float:
-        """How much shorter than the last one a step must be for this error."""
+        """Return the factor by which the last step must be shortened for an ``allowed`` error."""
         if self.errors[-1] <= 0.0:
             return 0.0
         return float((self.errors[-1] / allowed) ** (1.0 / self.order))
@@ -43,24 +43,24 @@ class Estimate:
 
     @property
     def errors(self) -> list[float]:
-        """The largest error of every rung."""
+        """Largest error of every rung."""
         return [max(errors) for errors in zip(*(d.errors for d in self.deviations), strict=True)]
 
     def worst(self, rung: int) -> str:
-        """The quantity that is worst on a rung."""
+        """Return the name of the quantity with the largest error on a rung."""
         return max(self.deviations, key=lambda deviation: deviation.errors[rung]).name
 
     def beyond(self, refinement: float) -> float:
-        """The largest error at a step shorter than the last one by a factor."""
+        """Return the largest error at a step shorter than the last by the factor ``refinement``."""
         return max(deviation.beyond(refinement) for deviation in self.deviations)
 
     def refinement(self, allowed: float) -> float:
-        """How much shorter than the last one a step must be for this error."""
+        """Return the factor by which the last step must be shortened for ``allowed`` errors."""
         return max(deviation.refinement(allowed) for deviation in self.deviations)
 
 
 def scales(values: Numbers) -> Numbers:
-    """What errors of the values are relative to."""
+    """Return the values that errors are relative to."""
     names = next(iter(values.values()))
     largest = {name: max(abs(quantities[name]) for quantities in values.values()) for name in names}
     return {
@@ -73,11 +73,11 @@ def scales(values: Numbers) -> Numbers:
 
 
 def estimate(values: Sequence[Numbers], steps: Sequence[float], order: float) -> Estimate:
-    """Errors of the rungs, coarse to fine, of methods of at most this ``order`` in their ``steps``.
+    """Return the errors of the rungs, coarse to fine, of methods of at most this ``order``.
 
-    Relative to the last rung. The last one's error is Richardson's, those of the others are their
-    distances from it on top, so that an early one that is near by chance counts for no more than
-    the last.
+    Errors are relative to the last rung. The last error is Richardson's; each other one adds the
+    distance to the last rung, so that an early rung that is close by chance has no smaller error
+    than the last.
     """
     deviations = []
     for flank, quantities in scales(values[-1]).items():

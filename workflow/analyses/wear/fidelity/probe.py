@@ -1,8 +1,9 @@
-"""Cheap lives of a joint: how deep and how much its section wears, on settings of any rung.
+"""Cheap probe runs of a joint: depth and volume that its section wears, for the settings of a rung.
 
-A life is that of the section in plane strain: its structure once, then each flank's line contact
-over all cycles of the run, in a few steps of one length. All rungs of an axis share these steps,
-so that their error, some per cent of the depth, is nearly the same in all and leaves differences.
+A probe run is that of the section in plane strain: it solves the structure once, then wears the
+line contact of each flank over all cycles of the run, in a few steps of equal length. All rungs of
+an axis use the same steps, so that the error of the steps, a few per cent of the depth, is nearly
+the same in all of them and cancels in differences.
 """
 
 from __future__ import annotations
@@ -29,15 +30,15 @@ from workflow.case.changing import changed
 from workflow.errors import MethodFailed
 from workflow.models.structure import StructureLoads
 
-# Settings of a probe along the axes that it does not vary: strips across a flank, nodes across it,
-# and increments to the peak and after it. Differences along one axis hardly depend on the others.
+# Settings of a probe run along the axes that it does not vary: strips across a flank, nodes across
+# it, and increments up to the peak and after it. Differences along one axis hardly depend on them.
 STRIPS, NODES, LEGS = 64, 10, (4, 7)
-# Elements round a fillet, whose stress no probe asks for.
+# Elements round a fillet, whose stress no probe run needs.
 NOTCH = 16
 
 
 def plane_section(case: DovetailCase) -> DovetailCase:
-    """The section of a case in plane strain, as probes run it: slips are the structure's."""
+    """Return the plane-strain section of a case for probe runs; the structure gives the slips."""
     return shortened(
         case,
         {
@@ -54,7 +55,7 @@ def plane_section(case: DovetailCase) -> DovetailCase:
 
 
 def _structure(case: DovetailCase) -> StructureLoads:
-    """The structure, which rungs of a contact's ladder share."""
+    """Return the structure of a case, cached because all rungs of a contact's ladder share it."""
     return _last_structure(changed(case, {"contact": Contact()}))
 
 
@@ -64,9 +65,9 @@ def _last_structure(case: DovetailCase) -> StructureLoads:
 
 
 def life(case: DovetailCase) -> Numbers:
-    """Depth [mm] and volume per length [mm²] of both bodies that a section wears, by flank.
+    """Return the depth [mm] and the volume per length [mm²] worn from both bodies, by flank.
 
-    The loads are those of the unworn structure. Raises what structure and contact raise, and
+    The loads are those of the unworn structure. Raises the errors of structure and contact, and
     MethodFailed where nothing wears.
     """
     stages, (*_, end) = live(case, _structure(case))
@@ -74,9 +75,9 @@ def life(case: DovetailCase) -> Numbers:
 
 
 def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
-    """A life whose structure is solved again after every step, and by how much loads drifted.
+    """Return a probe run with the structure solved after every step, and the drift of the loads.
 
-    The drift is that of the resultants in the end, as a run measures it.
+    The drift is that of the resultants at the end, as a run measures it.
     """
     structure = _structure(case)
     stages, (first, *_, end) = live(case, structure, "every")
@@ -87,7 +88,7 @@ def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
 
 
 def _wearing(numbers: Numbers) -> Numbers:
-    """The numbers, if anything wears. Raises MethodFailed."""
+    """Return the numbers if anything wears. Raises MethodFailed otherwise."""
     if not any(flank["volume"] > 0.0 for flank in numbers.values()):
         raise MethodFailed("nothing wears in a section of the case")
     return numbers
@@ -101,9 +102,9 @@ def _worn(depth: Array, grid: Grid) -> dict[str, float]:
 
 
 def end_life(case: DovetailCase, cells: int) -> Numbers:
-    """The same of the profile along the slot, as a line contact of so many strips.
+    """Return depth and volume of the profile along the slot, as a line contact of ``cells``.
 
-    It carries, per length across the flank, the section's load over the whole slot, and slides
+    Per length across the flank, it carries the section's load over the whole slot, and it slides
     everywhere by the section's mean slip.
     """
     structure = _structure(case)
@@ -125,7 +126,7 @@ def end_life(case: DovetailCase, cells: int) -> Numbers:
 
 
 def _along(loads: LoadHistory, factor: float) -> LoadHistory:
-    """Loads of the profile: P of the section, times a factor, and no moments."""
+    """Return the loads of the profile: P of the section times a factor, without moments."""
     none = np.zeros(len(loads))
     return LoadHistory(
         factor * loads.P, *(none,) * 7, loads.sliding, share=loads.share, block=loads.block
@@ -133,7 +134,7 @@ def _along(loads: LoadHistory, factor: float) -> LoadHistory:
 
 
 def _worn_away(contact: WearingContact, state: WearState, cycles: float) -> Array:
-    """Depth of both bodies after so many cycles."""
+    """Return the worn depth of both bodies after ``cycles``."""
     for _ in range(STEPS):
         step = cycles / STEPS
         stepper = ImplicitStepper(alone=True)

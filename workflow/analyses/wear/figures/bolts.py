@@ -1,4 +1,4 @@
-"""Figure of bolts: what of their tension is left as contacts wear, and over a cycle."""
+"""Figure of bolts: their tension as contacts wear, and over a cycle."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from workflow.pictures.style import BLUE, HEADROOM, ORANGE
 
 
 def bolts(file: h5py.File, contents: Contents) -> Figure:
-    """Tension at peak load over the cycles, and in each increment, unworn and worn."""
+    """Draw the tension at peak load over the cycles, and in each increment, unworn and worn."""
     groups = {name: file["bolts"][name] for name in contents.bolts}
     cycles, unit = file["kinetics/cycles"][()], f" N{contents.per}"
     ends = {name: [group["tension"][0], group["tension"][-1]] for name, group in groups.items()}

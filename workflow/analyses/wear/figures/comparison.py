@@ -1,4 +1,4 @@
-"""Figure of a wear run by method full: friction by the half-space against the structure's."""
+"""Figure of a wear run by method full: friction of the half-space and of the structure."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ NOTHING = 1e-4
 
 
 def half_space_and_structure(file: h5py.File, contents: Contents) -> Figure:
-    """Qx and Mz by increment, then p, qx and slip along x at some of them."""
+    """Draw Qx and Mz by increment, then p, qx and slip along x in some increments."""
     names, place = contents.names, "" if contents.line else " at y = 0"
     loads = _shown_loads(file, contents)
     rows = len(loads) + len(FIELDS)
@@ -56,7 +56,7 @@ def half_space_and_structure(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _cut(axes: Iterable[Axes], file: h5py.File, contents: Contents) -> None:
-    """Show what is in contact, and a little beside it."""
+    """Limit the axes to the contact and a margin."""
     views = [
         view_of(
             [field["pressure"][()] for field in _compared(file, name).values()],
@@ -70,13 +70,13 @@ def _cut(axes: Iterable[Axes], file: h5py.File, contents: Contents) -> None:
 
 
 def _compared(file: h5py.File, interface: str) -> dict[str, h5py.Group]:
-    """The half-space's fields, by increment."""
+    """Return the half-space's fields, by increment."""
     groups = file["comparison"][interface]
     return {key: group for key, group in groups.items() if key != "load_history"}
 
 
 def _shown_loads(file: h5py.File, contents: Contents) -> list[tuple[str, float, str]]:
-    """Resultants that are not nearly nothing: name, scale and unit."""
+    """Return name, scale and unit of the resultants that are not negligible."""
     histories = [
         file[f"{group}/{name}/load_history"]
         for group in ("structure", "comparison")
@@ -123,7 +123,7 @@ def _draw_profiles(
         along = field if field.ndim == 2 else field[0]
         label = f"increment {int(key) + 1}"
         axis.plot(centres(grid, 0), scale * middle(along, 0), color=colour, label=label)
-        # Loads of another code may be resultants alone, without tractions and of no slip.
+        # Loads of another code may be resultants alone, without tractions or slip.
         if contents.structure:
             place, values = nodes_on_middle(file["structure"][interface], name, int(key))
             axis.plot(place, scale * values, "x", color=colour, mew=2)
@@ -133,14 +133,14 @@ def _draw_profiles(
 def nodes_on_middle(
     face: h5py.Group, name: str, increment: int, direction: int = 0
 ) -> tuple[Array, Array]:
-    """Places and values of a field, or its x component, at the nodes nearest to a middle line."""
+    """Return places and values of a field (x component) at the nodes nearest to a middle line."""
     coordinates, field = face["coordinates"][()], face[name][increment]
     near = near_middle(coordinates, direction)
     return coordinates[near, direction], (field if field.ndim == 1 else field[0])[near]
 
 
 def _largest_difference(file: h5py.File, contents: Contents) -> str:
-    """How far the Q that follows from the energies is from the structure's."""
+    """Return the title: the largest difference of Q between half-space and structure."""
     largest = 0.0
     for interface in file["comparison"]:
         structure = file[f"structure/{interface}/load_history"]

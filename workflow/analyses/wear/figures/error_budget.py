@@ -1,4 +1,4 @@
-"""Figure of the error budget: what each approximation is estimated to leave of the main results."""
+"""Figure of the error budget: estimated errors of the main results due to each approximation."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, S
 
 COLOURS = dict(zip(PARTS, (BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK), strict=True))
 
-# Of a bar, in inches.
+# Height of a bar in inches.
 HEIGHT = 0.55
 
 
 def error_budget(file: h5py.File, contents: Contents) -> Figure:
-    """Bars of the parts of every error, a panel for each contact and each body."""
+    """Draw bars of the parts of every error, with a panel for each contact and each body."""
     panels = [(name, file["error"][name]) for name in contents.names]
     if contents.structure:
         panels += [
@@ -39,7 +39,7 @@ def error_budget(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _draw(axis: Axes, group: h5py.Group) -> None:
-    """Parts that make a result too small to the left of 0, and the size of all together."""
+    """Draw the parts, those that make a result too small to the left of 0, and the total."""
     results = [result for result in RESULTS if result in group]
     columns = np.array([group[result][()] for result in results])
     places, parts, totals = np.arange(len(results)), columns[:, :-1], 100.0 * columns[:, -1]
@@ -65,7 +65,7 @@ def _draw(axis: Axes, group: h5py.Group) -> None:
 
 
 def _name(result: str, total: float, parts: Array) -> str:
-    """A result with its error, and below what nobody knows of it."""
+    """Return the label of a result: its error and, below, its unknown parts."""
     unknown = [part for part, value in zip(PARTS, parts, strict=True) if np.isnan(value)]
     nothing = unknown and total == 0.0
     text = f"{RESULTS[result]}: {'?' if nothing else f'{total:.1f} %'}"

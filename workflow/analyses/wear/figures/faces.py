@@ -1,4 +1,4 @@
-"""Picture of the faces that meet, before anything runs: where each is, how far they are apart."""
+"""Picture of the contact faces before a run: position of each, and the gap between them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from workflow.pictures.style import BLUE, COLOUR_MAP, ORANGE, write_figures
 
 COLOURS = BLUE, ORANGE
 ROW_HEIGHT = 4.6
-# What lets one face be seen through the other.
+# Opacity, so that one face is visible through the other.
 ALPHA = 0.45
 TO_MICRONS = 1e3
-# Heights are shown to so many digits of a micron, over one at least: the rest is rounding.
+# Decimals of a micron in heights, and the least range shown: the rest is rounding.
 DIGITS, LEAST = 3, 1.0
 
 
@@ -32,7 +32,7 @@ def write_faces(mesh: StructureMesh, title: str, path: Path) -> None:
 
 
 def figure(mesh: StructureMesh, title: str) -> Figure:
-    """A row for each contact, seen along its normal; of line contacts from the side."""
+    """Return a figure with a row per contact, seen along its normal, line contacts sideways."""
     drawn = new_figure(f"{title}: contact faces", 0.8 + ROW_HEIGHT * len(mesh.interfaces))
     parts = drawn.subfigures(len(mesh.interfaces), 1, squeeze=False)[:, 0]
     for part, interface in zip(parts, mesh.interfaces, strict=True):
@@ -52,13 +52,13 @@ def figure(mesh: StructureMesh, title: str) -> Figure:
 
 
 def _in_frame(body: Body, interface: Interface) -> Array:
-    """Corners of the facets of a body's whole face ``(m, corners, 3)`` in the contact's frame."""
+    """Return facet corners of a body's whole face ``(m, corners, 3)`` in the contact's frame."""
     corners = body.points[body.facets(interface.name)]
     return interface.frame.coordinates(corners.reshape(-1, 3)).reshape(corners.shape)
 
 
 def _draw_areas(part: Any, interface: Interface, faces: list[Array], labels: list[str]) -> None:
-    """Both faces over each other, and the gap where they meet."""
+    """Draw both faces over each other, and the gap where they meet."""
     over, gap = part.subplots(1, 2)
     for corners, colour in zip(faces, COLOURS, strict=True):
         fill = PolyCollection(
@@ -82,10 +82,10 @@ def _draw_areas(part: Any, interface: Interface, faces: list[Array], labels: lis
 
 
 def _draw_lines(part: Any, interface: Interface, faces: list[Array], labels: list[str]) -> None:
-    """Both faces from the side, their heights enlarged."""
+    """Draw both faces from the side, with heights enlarged."""
     axis: Axes = part.subplots()
     for corners, colour, label in zip(faces, COLOURS, labels, strict=True):
-        # Facets one after the other, with nothing between them.
+        # Facets are separated by NaN, so that no lines connect them.
         places = np.concatenate([corners, np.full((len(corners), 1, 3), np.nan)], axis=1)
         x, _, height = places.reshape(-1, 3).T
         height = np.round(TO_MICRONS * height, DIGITS)

@@ -1,6 +1,6 @@
-"""Figure of the tangential loops on worn contacts, and of what they give for joint laws.
+"""Figure of the tangential loops on worn contacts, and of their results for joint laws.
 
-Bars are the errors that grid and increments are estimated to leave.
+Bars are the estimated errors due to grid and increments.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from workflow.pictures.panels import (
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
 
-# More loops than this in a panel overlap.
+# Largest number of loops in a panel without too much overlap.
 MOST_LOOPS = 6
-# Values with their estimated errors, and the unit they are drawn in.
+# Values with estimated errors, and the factor to the unit in which they are drawn.
 SHOWN = {"kt": PER_MICRON, "mu": 1.0, "energy_per_loop": 1.0}
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK)
 
 
 def loops(file: h5py.File, contents: Contents) -> Figure:
-    """Loops at several numbers of cycles, above stiffness and energy over cumulative energy."""
+    """Draw loops at several numbers of cycles, and below them stiffness and energy over wear."""
     groups, per = file["loops"], contents.per
     ends = {name: PER_MICRON * _column(group, "kt")[[0, -1]] for name, group in groups.items()}
     high = 5.0 * blocks(len(groups))
@@ -53,7 +53,7 @@ def loops(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _draw_loops(axis: Axes, group: h5py.Group) -> None:
-    """First loading thin, then the loop; one colour per number of cycles."""
+    """Draw first loading and loop, with one colour per number of cycles."""
     for jump, colour in shaded(sorted(group), MOST_LOOPS):
         loop = group[jump]
         cycles = float(loop.attrs["cycles"])
@@ -63,13 +63,14 @@ def _draw_loops(axis: Axes, group: h5py.Group) -> None:
 
 
 def _draw_evolution(figure: Any, groups: h5py.Group, per: str) -> None:
-    """Stiffness, friction and energy per loop over the energy that wear has dissipated."""
+    """Draw stiffness, friction and energy per loop over the energy that wear has dissipated."""
     panels = stiffness, friction, energy = figure.subplots(1, 3)
     mobilised = any(np.any(_column(group, "sliding") < SLIDES) for group in groups.values())
     for number, (name, group) in enumerate(groups.items()):
         colour = COLOURS[number % len(COLOURS)]
         worn = TO_JOULES * _column(group, "energy")
-        # Interfaces under one load are alike: the last must not hide the first.
+        # Interfaces under equal loads coincide: markers shrink so that the last does not hide the
+        # first.
         size = 8.0 - 4.0 * number / len(groups)
         look = {"color": colour, "marker": "o", "mfc": "none", "label": name, "markersize": size}
         for axis, (key, scale) in zip(panels, SHOWN.items(), strict=True):
@@ -86,5 +87,5 @@ def _draw_evolution(figure: Any, groups: h5py.Group, per: str) -> None:
 
 
 def _column(group: h5py.Group, name: str) -> Array:
-    """A value of every loop of an interface, in the order of the jumps."""
+    """Return a value of every loop of an interface, in the order of the jumps."""
     return np.array([float(group[jump].attrs[name]) for jump in sorted(group)])

@@ -25,16 +25,16 @@ from workflow.pictures.panels import (
 from workflow.pictures.style import BLUE, GREEN, HEADROOM, ORANGE
 
 NO_SLIDING = "no face slides as a whole"
-# Of increments that slide as a whole, so many stretches are named in a title.
+# Largest number of ranges of sliding increments in a title.
 MOST_RANGES = 4
-# Energies of less than so much sliding [mm] in a cycle are rounding.
+# Sliding distance [mm] in a cycle whose energy counts as rounding.
 NOTHING = 1e-9
 
 
 def resultants(file: h5py.File, contents: Contents) -> Figure:
-    """P, Qx within the Coulomb limits, and energy per increment, one column per interface.
+    """Draw P, Qx within the Coulomb limits, and energy per increment, one column per interface.
 
-    Where no energy is dissipated there is none to show.
+    Energies are left out where nothing is dissipated.
     """
     names, per = contents.names, contents.per
     loads = {name: _history(file, name) for name in names}
@@ -60,7 +60,7 @@ def resultants(file: h5py.File, contents: Contents) -> Figure:
         whole_ticks(column[-1].xaxis)
     energy_label = f"energy per\nincrement [mJ{per}]"
     label_rows(axes, (f"P [{unit}{per}]", f"Qx [{unit}{per}]", energy_label)[:rows])
-    # A force that stays is no line on the border.
+    # A constant force must not coincide with the border.
     largest = max(axis.dataLim.y1 for axis in axes[0])
     axes[0, 0].set_ylim(0.0, HEADROOM * largest if largest > 0.0 else None)
     legend_below(figure, axes[1:].flat)
@@ -70,9 +70,9 @@ def resultants(file: h5py.File, contents: Contents) -> Figure:
 def _energies(
     file: h5py.File, contents: Contents, interface: str, history: dict[str, Array]
 ) -> tuple[Array | None, Array]:
-    """Energy of every increment, of the loads if they tell, and of what wears.
+    """Return the energies of every increment: of the loads, if known, and of the worn model.
 
-    Of a mix per mean cycle.
+    In a mix they are per mean cycle.
     """
     share = history["share"] if contents.mix else 1.0
     wearing = file["contact"][interface][energy_name(contents.nodes)][()]
@@ -82,12 +82,12 @@ def _energies(
 
 
 def _history(file: h5py.File, interface: str) -> dict[str, Array]:
-    """Resultants of a contact over the cycle, by their names."""
+    """Return the resultants of a contact over the cycle, by name."""
     return {k: v[()] for k, v in file["structure"][interface]["load_history"].items()}
 
 
 def _cycles_shown(file: h5py.File, contents: Contents) -> str:
-    """One cycle, or those of a mix with their shares, by which energies are drawn."""
+    """Return the cycles shown, in words: one, or a mix with its shares."""
     if not contents.mix:
         return "one cycle"
     loads = file["structure"][contents.names[0]]["load_history"]
@@ -96,7 +96,7 @@ def _cycles_shown(file: h5py.File, contents: Contents) -> str:
 
 
 def _who_slides(loads: dict[str, dict[str, Array]]) -> str:
-    """What the faces do, for the title."""
+    """Return the share of sliding increments, for the title."""
     share = np.mean(np.concatenate([history["sliding"] for history in loads.values()]))
     return f"faces slide as a whole in {share:.0%} of the increments" if share else NO_SLIDING
 
@@ -127,7 +127,10 @@ def _draw_tangential_force(
 
 
 def _ranges(numbers: Iterable[Any]) -> str:
-    """``1-3, 7`` of ``1, 2, 3, 7``; ``none`` of nothing; of many stretches the first and last."""
+    """Return numbers as ranges: ``1–3, 7`` for ``1, 2, 3, 7``; ``none`` if there are none.
+
+    If there are many ranges, only the first ones and the last are named.
+    """
     whole = np.array([*numbers], dtype=int)
     runs = np.split(whole, np.flatnonzero(np.diff(whole) > 1) + 1) if whole.size else []
     texts = [f"{run[0]}–{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
@@ -139,7 +142,7 @@ def _ranges(numbers: Iterable[Any]) -> str:
 def _draw_energy(
     axis: Axes, increments: Array, reference: Array | None, wearing: Array, contents: Contents
 ) -> None:
-    """What is said of the loads in bars, what wears in diamonds."""
+    """Draw the energy of the loads as bars and that of the worn model as diamonds."""
     wears, loads, unit = contents.wears, contents.loads, f"mJ{contents.per}"
     after, against = float(wearing.sum()), ""
     if reference is not None:

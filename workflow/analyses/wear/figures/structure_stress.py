@@ -1,4 +1,4 @@
-"""Figure of the structure's stress in a section through the contacts, and of what wear changed."""
+"""Figure of the structure's stress in a section through the contacts, and its change by wear."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ from workflow.shell.results import grid_of
 STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
 CHANGE = "worn less unworn"
 
-# How far from the middle the section is, as a share of the body's diagonal.
+# Offset of the section from the middle, relative to the body's diagonal.
 BESIDE = 1e-7
-# Planes y = 0 of two faces are one if they differ by less: mesh files keep six digits.
+# Planes y = 0 of two faces are equal within this tolerance: mesh files have six digits.
 SAME_PLANE = 1e-5
-# Around the faces, how far the section shows the bodies: as a share of what the faces span.
+# Margin of the section around the faces, relative to their extent.
 SECTION_MARGIN = 0.4
 
 
 class _Section(NamedTuple):
-    """One body's stress in the section.
+    """Stress of one body in the section.
 
-    ``points (n, 2)`` to the right and up [mm], ``triangles (m, 3)``, ``stress (n,)`` [MPa], and
-    ``outline (k, 2, 2)``, the segments of the body's border.
+    ``points`` ``(n, 2)`` are to the right and up [mm]; ``triangles`` ``(m, 3)`` have the ``stress``
+    ``(n,)`` [MPa] at their corners; ``outline`` ``(k, 2, 2)`` has the segments of the body's
+    border.
     """
 
     points: Array
@@ -43,7 +44,7 @@ class _Section(NamedTuple):
 
 
 def structure_stress(file: h5py.File, contents: Contents) -> Figure:
-    """Von Mises stress of both bodies around the faces: unworn, worn and what wear changed."""
+    """Draw the von Mises stress of both bodies around the faces: unworn, worn and change."""
     right, up = _shown_axes(file)
     low, high = _window(file)
     panels = {state: _sections(file, state) for state in _states(file)}
@@ -57,7 +58,7 @@ def structure_stress(file: h5py.File, contents: Contents) -> Figure:
         least, most = ranges[state]
         signed = state == CHANGE
         colours = _draw_sections(axis, sections, max(-least, most) if signed else top, signed)
-        # The surroundings of the faces, where wear makes the difference.
+        # The view shows the surroundings of the faces, where wear has an effect.
         axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel=f"{'XYZ'[up]} [mm]")
         axis.set_title(f"{state}: {least:+.0f} to {most:+.0f} MPa" if signed else state)
         figure.colorbar(colours, ax=axis, label="[MPa]", pad=0.01)
@@ -66,7 +67,7 @@ def structure_stress(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _place(file: h5py.File, contents: Contents) -> str:
-    """Which section of the bodies is shown, for the title."""
+    """Return the place of the section for the title."""
     if contents.line:
         return "in plane strain"
     (name, first), *others = ((name, group.attrs) for name, group in file["grid"].items())
@@ -80,7 +81,7 @@ def _place(file: h5py.File, contents: Contents) -> str:
 
 
 def _states(file: h5py.File) -> list[str]:
-    """What there is to show; a change needs both states on one mesh."""
+    """Return the states to show; a change needs both states on one mesh."""
     one_mesh = all(
         np.array_equal(body["unworn/elements"], body["worn/elements"])
         for body in file["bodies"].values()
@@ -89,13 +90,13 @@ def _states(file: h5py.File) -> list[str]:
 
 
 def _shown_axes(file: h5py.File) -> list[int]:
-    """Global axes to the right and to the top; the third is nearest to the first face's y."""
+    """Return the global axes to the right and up; the third is closest to the first face's y."""
     y = np.abs(next(iter(file["grid"].values())).attrs["axes"][1])
     return [axis for axis in range(3) if axis != np.argmax(y)]
 
 
 def _sections(file: h5py.File, state: str) -> list[_Section]:
-    """Both bodies in the plane y = 0 of the first face."""
+    """Return the sections of both bodies in the plane y = 0 of the first face."""
     bodies = file["bodies"].values()
     if state != CHANGE:
         return [_cut(file, body[state], body[state]["von_mises"][()]) for body in bodies]
@@ -105,13 +106,13 @@ def _sections(file: h5py.File, state: str) -> list[_Section]:
 
 
 def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
-    """One body and a nodal stress cut by the plane y = 0 of the first face; a plane body whole."""
+    """Return the section of a body and a nodal stress at y = 0; a plane body is shown whole."""
     shown = _shown_axes(file)
     face = next(iter(file["grid"].values())).attrs
     mesh = body_mesh(body)
     mesh.point_data["stress"] = stress
     if body["elements"].shape[1] == 4:
-        # Beside the middle: a plane through nodes of the mesh leaves holes between its elements.
+        # The plane is off the middle, as a plane through nodes leaves holes between elements.
         beside = face["origin"] + BESIDE * mesh.length * face["axes"][1]
         cut = mesh.slice(normal=face["axes"][1], origin=beside).triangulate()
     else:
@@ -128,7 +129,7 @@ def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
 
 
 def _draw_sections(axis: Axes, sections: list[_Section], top: float, signed: bool) -> Any:
-    """Colours and outlines of the bodies; returns the colours."""
+    """Draw colours and outlines of the bodies, and return the colours."""
     axis.set_aspect("equal")
     axis.grid(visible=False)
     for section in sections:
@@ -145,7 +146,7 @@ def _draw_sections(axis: Axes, sections: list[_Section], top: float, signed: boo
 
 
 def _window(file: h5py.File) -> tuple[Array, Array]:
-    """Lower left and upper right corner of the view, ``(2,)`` each [mm]."""
+    """Return the lower left and upper right corner of the view, ``(2,)`` each [mm]."""
     shown = _shown_axes(file)
     ends = []
     for group in file["grid"].values():
@@ -157,7 +158,7 @@ def _window(file: h5py.File) -> tuple[Array, Array]:
 
 
 def _range_within(low: Array, high: Array, sections: list[_Section]) -> tuple[float, float]:
-    """Smallest and largest stress between two corners [MPa]."""
+    """Return the smallest and largest stress between two corners [MPa]."""
     seen = [s.stress[np.all((s.points >= low) & (s.points <= high), axis=1)] for s in sections]
     every = np.concatenate(seen)
     return float(every.min()), float(every.max())

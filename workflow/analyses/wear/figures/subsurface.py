@@ -38,9 +38,9 @@ from workflow.shell.results import grid_of
 
 COLOURS = "magma_r"
 LEVELS = 24
-# Beside the contact, how far sections are shown: as a share of its width.
+# Margin of sections on either side of the contact, relative to its width.
 BESIDE = 0.5
-# Name of what a map shows, its symbol and unit, by the parameter of the case.
+# Dataset, symbol and unit of a map, by the parameter of the case.
 PARAMETERS = {
     "ruiz": ("cracking_parameter", "Ruiz's F2", "N²/mm³"),
     "smith_watson_topper": ("smith_watson_topper", "SWT parameter", "MPa"),
@@ -52,15 +52,15 @@ PARAMETERS = {
 
 
 def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
-    """Von Mises stress in the section of every contact at peak load, unworn and worn."""
+    """Draw the von Mises stress in the section of every contact at peak load, unworn and worn."""
     sections = file["stress/section"]
     strained = contents.strained
-    # By moment, the bodies together.
+    # Arrays are by moment, with both bodies together.
     fields = {
         name: _values(group, "von_mises", strained).swapaxes(0, 1)
         for name, group in sections.items()
     }
-    # Outside a body stress is not a number.
+    # Stress outside a body is nan.
     largest = {name: np.nanmax(field, axis=(1, 2, 3)) for name, field in fields.items()}
     top = float(max(moments.max() for moments in largest.values()))
     title = f"Von Mises stress under the contact at peak load: {changes(largest, '.0f', ' MPa')}"
@@ -93,7 +93,7 @@ def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _whose_sections(contents: Contents, begins: float) -> str:
-    """Which body is where in a section that ``begins`` so many µm below the surfaces."""
+    """Return which body is where in a section that starts ``begins`` µm below the surfaces."""
     lower, upper = contents.bodies
     start = f"from {begins:.3g} µm below"
     if 1 not in contents.strained:
@@ -106,9 +106,9 @@ def _whose_sections(contents: Contents, begins: float) -> str:
 def _window(
     file: h5py.File, contents: Contents, interface: str
 ) -> tuple[tuple[float, float], float]:
-    """What of a section is shown: the contact and as much beside it along the face, and the depth.
+    """Return the window of a section: along the face the contact with a margin, and the depth.
 
-    Stress fades within the width of the contact.
+    Stress decays within the width of the contact.
     """
     grid, section = grid_of(file["grid"][interface]), file["stress/section"][interface]
     pressures = [file["contact"][interface][jump]["pressure"][()] for _, jump in contents.ends]
@@ -117,19 +117,19 @@ def _window(
 
 
 def _values(group: h5py.Group, field: str, bodies: Sequence[int]) -> Array:
-    """A field of such bodies, unworn and worn, ``(bodies, 2, ...)``."""
+    """Return a field of these bodies, unworn and worn ``(bodies, 2, ...)``."""
     return np.array(
         [[group[f"{moment}/body_{body}/{field}"][()] for moment in MOMENTS] for body in bodies]
     )
 
 
 def _heights(group: h5py.Group, body: int) -> Array:
-    """Heights of a section's points in the interface frame [mm]."""
+    """Return the heights of a section's points in the interface frame [mm]."""
     return (-1.0 if body == 1 else 1.0) * group["depths"][()]
 
 
 def _draw_section(axis: Axes, group: h5py.Group, field: Mapping[int, Array], top: float) -> Any:
-    """Body 1 below and body 2 above the surface, on one colour scale; returns the colours."""
+    """Draw body 1 below and body 2 above the surface on one colour scale; return the colours."""
     axis.grid(visible=False)
     for body, values in field.items():
         colours = axis.contourf(
@@ -144,7 +144,7 @@ def _draw_section(axis: Axes, group: h5py.Group, field: Mapping[int, Array], top
 
 
 def _draw_yield(axis: Axes, group: h5py.Group, field: Mapping[int, Array]) -> None:
-    """Where a body with a yield stress would yield."""
+    """Draw the contour of the yield stress of each body that exceeds it."""
     halo: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]
     for body, values in field.items():
         limit = group.attrs.get(f"yield_stress_{body}", np.inf)
@@ -160,7 +160,7 @@ def _draw_yield(axis: Axes, group: h5py.Group, field: Mapping[int, Array]) -> No
 
 
 def fretting_life(file: h5py.File, contents: Contents) -> Figure:
-    """The fretting parameter over every contact, both bodies, unworn beside worn."""
+    """Draw the fretting parameter over every contact, for both bodies, unworn and worn."""
     groups = {name: file["stress/life"][name] for name in contents.cracking}
     life = groups[contents.cracking[0]].attrs
     parameter, symbol, unit = PARAMETERS[life["parameter"]]
@@ -182,7 +182,7 @@ def fretting_life(file: h5py.File, contents: Contents) -> Figure:
 
 
 Panels = dict[tuple[str, str], tuple[Grid, Array]]
-"""By interface and body the grid, and the parameter ``(2, nx, ny)`` unworn and worn."""
+"""Grid and parameter ``(2, nx, ny)``, unworn and worn, by interface and body."""
 
 
 def _maps(title: str, label: str, panels: Panels) -> Figure:
@@ -197,7 +197,7 @@ def _maps(title: str, label: str, panels: Panels) -> Figure:
 
 
 def _curves(title: str, label: str, panels: Panels) -> Figure:
-    """Line contacts: the parameter over x, a row for each body."""
+    """Draw the parameter of line contacts over x, with a row for each body."""
     names, bodies = (list(dict.fromkeys(words)) for words in zip(*panels, strict=True))
     figure = new_figure(title, (1.0 + 3.8 * len(bodies)) * blocks(len(names)))
     axes = panel_rows(figure, len(bodies), len(names))

@@ -1,4 +1,4 @@
-"""Figures of a wear run: peak pressure, worn profiles, kinetics; and the list of them all."""
+"""Figures of a wear run: peak pressure, worn profiles, kinetics; and the list of all figures."""
 
 from __future__ import annotations
 
@@ -47,26 +47,27 @@ from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
 from workflow.shell.results import grid_of
 
-# Colour, marker, its size and fill: bodies of one material wear alike, and the second must not hide
-# the first.
+# Colour, marker, its size and fill: bodies of one material wear equally, and the second must not
+# hide the first.
 BODY_STYLES: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "marker": "o", "markersize": 9, "mfc": "none"},
     {"color": ORANGE, "marker": "s", "markersize": 5},
 )
 
-# The rounding is many times deeper than young wear: heights are shown up to so many depths.
+# Heights are shown up to this many worn depths, because rounded edges are much deeper than early
+# wear.
 HEIGHT_IN_DEPTHS = 2.0
-# And what they show below the lowest.
+# Margin below the lowest height, in worn depths.
 BELOW = 0.15
-# Of the band of its uncertainty, which is curved.
+# Points of the uncertainty band, which is curved.
 BAND_POINTS = 50
-# What a profile along x and one along y show; a line contact has no y.
+# Titles of profiles along x and along y; a line contact has no y.
 ALONG = "along x at y = 0", "along y at x = 0"
 ALONG_LINE = ("along x",)
 
 
 def figures_of(contents: Contents) -> Figures:
-    """The figures of a run, by name; the first is what to look at first."""
+    """Return the figures of a run, by name; the most important one comes first."""
     drawn = {
         "pressure_profiles": (pressure_profiles, True),
         "pressure_maps": (pressure_maps, not contents.line),
@@ -90,7 +91,7 @@ def figures_of(contents: Contents) -> Figures:
 
 
 def pressure_maps(file: h5py.File, contents: Contents) -> Figure:
-    """Peak-load pressure of every face, unworn and worn, on one colour scale."""
+    """Draw the peak-load pressure of every face, unworn and worn, on one colour scale."""
     rows, peaks = [], {}
     for name in contents.names:
         grid = grid_of(file["grid"][name])
@@ -113,13 +114,13 @@ def _map_title(interface: str, cycles: str, field: Array, grid: Grid) -> str:
 
 
 def _pressures(file: h5py.File, contents: Contents, interface: str) -> dict[str, Array]:
-    """Pressure at peak load, first and last, by jump."""
+    """Return the pressure at peak load of the first and last jump, by jump."""
     contact = file["contact"][interface]
     return {jump: contact[jump]["pressure"][()] for jump in _ends(contents)}
 
 
 def _shown_span(file: h5py.File, contents: Contents, direction: int) -> tuple[float, float]:
-    """From where to where all faces are in contact along x (0) or y (1), with a margin [mm]."""
+    """Return the range of contact of all faces along x (0) or y (1), with a margin [mm]."""
     views = [
         view_of(
             list(_pressures(file, contents, name).values()),
@@ -132,7 +133,7 @@ def _shown_span(file: h5py.File, contents: Contents, direction: int) -> tuple[fl
 
 
 def pressure_profiles(file: h5py.File, contents: Contents) -> Figure:
-    """Peak-load pressure along both middle lines of each face, with the coarse solutions."""
+    """Draw the peak-load pressure along both middle lines of each face, with coarse solutions."""
     names, along = contents.names, ALONG_LINE if contents.line else ALONG
     figure = new_figure(_edge_peak(file, contents), (1.0 + 4.0 * len(along)) * blocks(len(names)))
     axes = panel_rows(figure, len(along), len(names), sharex="row")
@@ -150,7 +151,7 @@ def pressure_profiles(file: h5py.File, contents: Contents) -> Figure:
 def _draw_profile(
     axis: Axes, file: h5py.File, contents: Contents, interface: str, direction: int
 ) -> None:
-    """Pressure along x (``direction`` 0) or y (1) through the middle."""
+    """Draw the pressure along x (``direction`` 0) or y (1) through the middle."""
     contact, grid = file["contact"][interface], grid_of(file["grid"][interface])
     for jump, colour in zip(_ends(contents), (BLUE, ORANGE), strict=False):
         on = " on" if contents.nodes else ""
@@ -169,13 +170,13 @@ def _draw_profile(
 
 
 def _nodal_pressure(file: h5py.File, interface: str, direction: int) -> tuple[Array, Array]:
-    """Places and pressures at peak load of the FE nodes nearest to the middle line."""
+    """Return places and peak-load pressures of the FE nodes nearest to the middle line."""
     peak = int(file.attrs["peak_increment"])
     return nodes_on_middle(file["structure"][interface], "pressure", peak, direction)
 
 
 def _edge_peak(file: h5py.File, contents: Contents) -> str:
-    """Largest pressure at y = 0 of the face where it is largest, by every method."""
+    """Return the title: the pressure peak at y = 0 of the most loaded face, by every method."""
     unworn = contents.jump_names[0]
     peaks = {
         name: middle(file["contact"][name][unworn]["pressure"][()], 0).max()
@@ -198,7 +199,7 @@ def _edge_peak(file: h5py.File, contents: Contents) -> str:
 
 
 def worn_profiles(file: h5py.File, contents: Contents) -> Figure:
-    """Both surfaces and the depth worn off, along x in the middle of each face, as cycles go by."""
+    """Draw surfaces and worn depth along x in the middle of each face, as cycles go by."""
     names, (lower, upper) = contents.names, contents.bodies
     figure = new_figure("", 9.5 * blocks(len(names)))
     axes = panel_rows(figure, 2, len(names))
@@ -224,7 +225,7 @@ def worn_profiles(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _draw_wear(axes: Iterable[Axes], file: h5py.File, contents: Contents, interface: str) -> float:
-    """Heights above, depths below, one colour per number of cycles; returns the last depth [µm]."""
+    """Draw heights above and depths below, a colour per number of cycles; return the depth [µm]."""
     heights, depths = axes
     surfaces, x = file["surfaces"][interface], centres(grid_of(file["grid"][interface]), 0)
     unworn = _middle_heights(surfaces[contents.jump_names[0]])
@@ -238,12 +239,12 @@ def _draw_wear(axes: Iterable[Axes], file: h5py.File, contents: Contents, interf
 
 
 def _middle_heights(surfaces: h5py.Group) -> Array:
-    """Heights of both bodies along x at y = 0, ``(2, nx)`` [µm]."""
+    """Return the heights of both bodies along x at y = 0 ``(2, nx)`` [µm]."""
     return TO_MICRONS * np.stack([middle(surfaces[f"body_{body}"][()], 0) for body in (1, 2)])
 
 
 def kinetics(file: h5py.File, contents: Contents) -> Figure:
-    """Depth, volume and area over the cycles, with linear regimes and where they lead."""
+    """Draw depth, volume and area over the cycles, with linear regimes and extrapolations."""
     groups = {name: file["kinetics"][name] for name in contents.names}
     cycles, per = file["kinetics/cycles"][()], contents.per
     volumes = {
@@ -268,7 +269,7 @@ def kinetics(file: h5py.File, contents: Contents) -> Figure:
     largest = max(group["area"][()].max() for group in groups.values())
     axes[2, 0].set_ylim(0.0, HEADROOM * largest)
     label_rows(axes, ("largest depth [µm]", f"volume [{unit}{per}]", f"area [mm²{per}]"))
-    # Not every panel has a linear regime.
+    # Entries are collected from all panels, since not every one has a linear regime.
     legend_below(figure, axes.flat)
     return figure
 
@@ -281,7 +282,7 @@ def _draw_kinetics(
     bodies: tuple[str, str],
     scale: float = 1.0,
 ) -> None:
-    """Both bodies and their sum; dashed beyond the computed cycles."""
+    """Draw both bodies and their sum; dashed beyond the computed cycles."""
     worn = [scale * group[f"{quantity}_{body}"][()] for body in (1, 2)]
     for values, name, look in zip(worn, bodies, BODY_STYLES, strict=True):
         axis.plot(cycles, values, linestyle="", label=name, **look)
@@ -298,7 +299,7 @@ def _draw_kinetics(
 
 
 def _draw_extrapolation(axis: Axes, regime: LinearRegime) -> None:
-    """The line beyond the computed cycles, dashed, in the band of its uncertainty."""
+    """Draw the line beyond the computed cycles, dashed, with its uncertainty band."""
     beyond = regime.last_cycles * np.array([1.0, EXTRAPOLATION])
     label = "both, extrapolated (not computed)"
     axis.plot(beyond, regime.extrapolate(beyond), "--", color=BLACK, label=label)
@@ -315,7 +316,7 @@ def _draw_area(axis: Axes, cycles: Array, group: h5py.Group, interface: str, per
 
 
 def _rate(group: h5py.Group, per: str) -> str:
-    """Volume rate of the linear regime, for a title."""
+    """Return the volume rate of the linear regime, for a title."""
     rate = 1e6 * float(group.attrs["volume_rate"])
     if not np.isfinite(rate):
         return "no linear regime, no extrapolation"
@@ -324,7 +325,7 @@ def _rate(group: h5py.Group, per: str) -> str:
 
 
 def _regime(group: h5py.Group, cycles: Array) -> str:
-    """From when the depth grows linearly, for a title."""
+    """Return when linear growth of the depth starts, for a title."""
     linear_from = float(group.attrs["depth_linear_from"])
     if np.isfinite(linear_from):
         return f"linear from {linear_from:,.0f} cycles"
@@ -335,16 +336,16 @@ def _regime(group: h5py.Group, cycles: Array) -> str:
 
 
 def _ends(contents: Contents) -> list[str]:
-    """First and last jump; one where nothing wore."""
+    """Return the first and last jump; only one if nothing wore."""
     return list(dict.fromkeys(jump for _, jump in contents.ends))
 
 
 def _cycles(file: h5py.File, interface: str, jump: str) -> str:
-    """How worn a jump is, in words."""
+    """Return the number of cycles of a jump, in words."""
     cycles = float(file["contact"][interface][jump].attrs["cycles"])
     return f"{cycles:,.0f} cycles" if cycles else "unworn"
 
 
 def _cells(grid: Grid) -> str:
-    """The grid's size in words."""
+    """Return the grid's size in words."""
     return f"{grid.shape[0]} strips" if grid.line else f"{grid.shape[0]} x {grid.shape[1]}"

@@ -1,1 +1,1 @@
-"""Wear runs for ParaView."""
+"""Output of wear runs for ParaView."""

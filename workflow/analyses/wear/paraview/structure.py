@@ -12,13 +12,13 @@ from workflow.analyses.wear.body_mesh import body_mesh
 from workflow.analyses.wear.layout import Contents
 from workflow.pictures.vtk import CYCLES, INCREMENTS, Step, attach, write_series
 
-# Fields of a body, with units; those of its surface over the increments have no tensors.
+# Fields of a body, with units; its surface over the increments has no tensors.
 SURFACE = {"displacement": "mm", "von_mises": "MPa", "maximum_principal": "MPa"}
 NODAL = SURFACE | {"stress": "MPa"}
 
 
 def write_structure(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
-    """The series of both bodies at peak load, and of those over the increments that are there."""
+    """Write the series of both bodies at peak load, and those over the increments if present."""
     bodies = _bodies(contents, file, folder / "structure")
     written = write_series(folder / "structure.pvd", CYCLES, bodies)
     for state, _ in contents.states if contents.mission else ():
@@ -28,7 +28,7 @@ def write_structure(contents: Contents, file: h5py.File, folder: Path) -> list[P
 
 
 def _bodies(contents: Contents, file: h5py.File, folder: Path) -> Iterator[Step]:
-    """All bodies at peak load, unworn and worn, with nodal displacement and stresses."""
+    """Yield all bodies at peak load, unworn and worn, with nodal displacement and stresses."""
     cycles = file["kinetics/cycles"][()]
     for (state, _), time in zip(contents.states, cycles[[0, -1]].tolist(), strict=False):
         for body, states in file["bodies"].items():
@@ -40,7 +40,7 @@ def _bodies(contents: Contents, file: h5py.File, folder: Path) -> Iterator[Step]
 
 
 def _mission(file: h5py.File, state: str, folder: Path) -> Iterator[Step]:
-    """What is seen of all bodies, in every increment that is told."""
+    """Yield the surfaces of all bodies in every stored increment."""
     import pyvista
 
     missions = {body: states[state]["mission"] for body, states in file["bodies"].items()}

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 def write_life(
     contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
 ) -> list[Path]:
-    """Maps of the fretting parameter and what it is made of, unworn and worn, by body."""
+    """Write maps of the fretting parameter and its factors, unworn and worn, by body."""
     if interface not in contents.life:
         return []
     path = folder / f"life_{interface}.pvd"
@@ -52,7 +52,7 @@ def _maps(
 
 
 def write_sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> list[Path]:
-    """The section through the bodies, unworn and worn, and the series that lists them."""
+    """Write the section through the bodies, unworn and worn, and the series that lists them."""
     if not contents.sections:
         return []
     path = folder / f"section_{interface}.pvd"
@@ -70,7 +70,7 @@ def _sections(contents: Contents, file: h5py.File, interface: str, folder: Path)
 
 
 def _section(group: h5py.Group, state: str, body: int, frame: Frame) -> pyvista.UnstructuredGrid:
-    """One body's section, without what lies outside the body."""
+    """Return the mesh of one body's section, without points outside the body."""
     import pyvista
 
     places, equivalent = _places(group, body), group[state]["von_mises"][()]
@@ -83,7 +83,7 @@ def _section(group: h5py.Group, state: str, body: int, frame: Frame) -> pyvista.
         frame.to_global(places.reshape(-1, 3)[points]) + frame.origin,
     )
     along_face = group[state]["stress"][()].reshape(6, -1)[:, points]
-    # The other way round: what the axes of the face are to the global ones.
+    # The transposed axes turn components from the face's axes to the global ones.
     along_global = turned(along_face, Frame(frame.origin, frame.axes.T))
     fields: Fields = {
         "von_mises": (equivalent.ravel()[points], "MPa"),
@@ -95,7 +95,7 @@ def _section(group: h5py.Group, state: str, body: int, frame: Frame) -> pyvista.
 
 
 def _places(group: h5py.Group, body: int) -> Array:
-    """The section's points in the interface frame ``(n, k, 3)`` [mm]."""
+    """Return the section's points in the interface frame ``(n, k, 3)`` [mm]."""
     along, depths = np.meshgrid(group["along"][()], group["depths"][()], indexing="ij")
     across = np.full_like(along, float(group.attrs["at"]))
     in_plane = (along, across) if group.attrs["axis"] == "x" else (across, along)

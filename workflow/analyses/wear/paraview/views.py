@@ -1,4 +1,4 @@
-"""What the scripts show of a wear run: wear over the cycles, the structure over a mission."""
+"""Views of the scripts for ParaView: wear over the cycles, the structure over a mission."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ VON_MISES = "von_mises [MPa]"
 
 
 def write_views(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
-    """Write the scripts; returns their paths."""
+    """Write the scripts and return their paths."""
     title, cycles = str(file.attrs["title"]), file["kinetics/cycles"][()]
     wear = Scene(title, CYCLES, float(cycles[-1]), list(_views_of_wear(contents, file)))
     written = [write_view(wear, folder / FIRST)]
@@ -49,6 +49,6 @@ def _views_of_wear(contents: Contents, file: h5py.File) -> Iterator[View]:
 
 
 def _wears_most(file: h5py.File, interface: str) -> int:
-    """Number of the body that is worn deepest."""
+    """Return the number of the body that is worn deepest."""
     kinetics = file["kinetics"][interface]
     return 1 if kinetics["depth_1"][-1] >= kinetics["depth_2"][-1] else 2

@@ -1,20 +1,20 @@
 """A wear run for ParaView: faces as they wear, the structure before and after, worn surfaces.
 
-Written into one folder:
+The folder has these files:
 
-- ``view.py``, to be opened first, and ``view_mission.py``: scripts that show what is there;
+- ``view.py``, to be opened first, and ``view_mission.py``: scripts that show the results;
 - ``<interface>.pvd``: time series over the cycles; every step has the points of the contact grid
   that lie on the face (``<interface>/<jump>.vtp``, a line in line contacts), in its nominal
-  plane. Warp By Vector on ``surface_1`` or ``surface_2`` makes them the surface of a body
-  as it is, rounded edges and wear included, on ``worn_1`` or ``worn_2`` its wear alone;
+  plane. Warp By Vector on ``surface_1`` or ``surface_2`` shows the true surface of a body, with
+  rounded edges and wear; on ``worn_1`` or ``worn_2`` the wear alone;
 - ``life_<interface>.pvd``: the fretting parameter on the same points, unworn and worn;
 - ``section_<interface>.pvd``: stress in a plane through both bodies under the contact, unworn and
   worn (``section/<interface>_<state>_<body>.vtu``);
 - ``structure.pvd``: all bodies at peak load, unworn at 0 and worn at the last computed number of
   cycles (``structure/<body>_<state>.vtu``); Warp By Vector on ``displacement`` deforms them;
 - ``mission_unworn.pvd`` and ``mission_worn.pvd``: their surfaces over the increments of the load;
-- ``flank_<interface>_<body>.stl``: the worn surfaces at true scale in global coordinates, but for
-  line contacts.
+- ``flank_<interface>_<body>.stl``: the worn surfaces at true scale in global coordinates, except
+  for line contacts.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from workflow.shell.results import frame_of, grid_of
 
 
 def write_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
-    """Write the files that show a wear run; returns their paths."""
+    """Write the files that show a wear run, and return their paths."""
     written: list[Path] = []
     for name in contents.names:
         points = _face_points(file, name)
@@ -64,9 +64,9 @@ def write_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
 
 
 def _face_points(file: h5py.File, interface: str) -> FacePoints:
-    """The cells of an interface's grid that lie on the FE contact faces, rounding included.
+    """Return the cells of an interface's grid that lie on the finite element contact faces.
 
-    What the grid has beyond these is no part of the bodies.
+    Rounded edges are included. Cells beyond the faces are not part of the bodies.
     """
     grid, frame = grid_of(file["grid"][interface]), frame_of(file["grid"][interface])
     group = file["structure"][interface]
@@ -79,7 +79,7 @@ def _face_points(file: h5py.File, interface: str) -> FacePoints:
 def _faces(
     contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
 ) -> Iterator[Step]:
-    """One face, after every jump."""
+    """Yield one face after every jump."""
     contact, surfaces = file["contact"][interface], file["surfaces"][interface]
     for jump in contents.jump_names:
         fields = traction_fields(contact[jump], points) | _surface_fields(surfaces, jump, points)
@@ -88,7 +88,7 @@ def _faces(
 
 
 def _surface_fields(surfaces: h5py.Group, jump: str, points: FacePoints) -> Fields:
-    """Depths, and the vectors from the nominal plane to the surfaces and what is worn of these."""
+    """Return depths, and vectors from the nominal plane for surfaces and their wear."""
     fields: Fields = {}
     depths = []
     for body in (1, 2):
@@ -107,9 +107,9 @@ def _surface_fields(surfaces: h5py.Group, jump: str, points: FacePoints) -> Fiel
 def _write_worn_surfaces(
     contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
 ) -> list[Path]:
-    """STL of both worn surfaces of one face, for CAD and meshers.
+    """Write STL files of both worn surfaces of one face, for CAD and meshers.
 
-    Vertices are the points of the face. Normals point out of the body. An STL file holds single
+    Vertices are the points of the face. Normals point out of the body. An STL file has single
     precision: about 1e-5 mm at 250 mm from the origin.
     """
     import pyvista

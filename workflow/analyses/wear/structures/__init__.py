@@ -1,4 +1,4 @@
-"""The structures that may load contacts. A new one is a folder here and a name below."""
+"""Structures that may load contacts. A new one is a folder here and a name below."""
 
 from typing import Any
 
@@ -16,5 +16,5 @@ STRUCTURES: tuple[WearStructure[Any], ...] = (
 
 
 def structure_of(case: WearCase) -> WearStructure[Any]:
-    """The structure of a case."""
+    """Return the kind of structure of a case."""
     return next(structure for structure in STRUCTURES if structure.case is type(case))

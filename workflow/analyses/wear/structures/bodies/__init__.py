@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from wear.contact.tractions import CycleTractions
     from workflow.models.loads import LoadSource
 
-# Path of slip in a cycle of a contact that forces shear, to tell about how long it takes [mm].
+# Slip path in a cycle of a contact under shear forces, for the estimate of run times [mm].
 PARTIAL_SLIP = 5e-3
-# Increments of such a cycle once they are split, about: two legs of one to 2 % took 8 to 64.
+# Typical number of increments after splitting: two legs of one, to 2 %, took 8 to 64.
 SPLIT_INTO = 32
 
 
@@ -33,7 +33,7 @@ def _source(case: TwoBodiesWearCase) -> LoadSource:
 
 
 def _extent(case: TwoBodiesWearCase) -> Extent:
-    """Every increment of the cycle may dissipate; under forces they are split."""
+    """Return the extent of the cycle: all increments may dissipate, and forces split them."""
     table = case.load_path.table()
     steps = [table[name] - np.roll(table[name], 1) for name in SHIFTS]
     path = float(np.hypot(*steps).sum())

@@ -1,7 +1,7 @@
 """A wear case of two bodies without a structure, under a closed cycle of forces and motions.
 
-A line contact, in plane strain, differs in the dimensions of its loads and its grid: a separate
-kind of case, though both are written ``analysis: wear`` and ``kind: bodies``.
+A line contact, in plane strain, has other dimensions of loads and grid and is a separate kind of
+case, though both are written ``analysis: wear`` and ``kind: bodies``.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ Direction = Annotated[
 Increments = Annotated[int, Whole(1, 1000)]
 Accuracy = Annotated[float, Quantity("1", at_least=1e-6, at_most=1.0)]
 
-# Of the only contact.
+# Name of the only contact.
 NAME = "interface"
 FLAT = "flat"
 SHIFTS = "shift_x", "shift_y"
-# What shears a contact otherwise than by moving all of it.
+# Loads that shear a contact other than by moving all of it.
 SHEARING = {"Qx", "Qy", "Mz", "twist", "bulk_stress_1", "bulk_stress_2"}
 TILTS = "of the bodies, held: as they are placed; free: as no moment at all leaves them"
 
@@ -101,7 +101,7 @@ BodiesOfLine = Annotated[
 
 
 def with_held(path: LoadPath | LineLoadPath) -> LoadTable:
-    """Every increment of a cycle, with what is held: motions of 0."""
+    """Return the loads of every increment of a cycle, with motions of 0 for what is held."""
     given = path.table()
     held = ["twist"] if "Mz" not in given.columns else []
     if path.tilt == "held":
@@ -111,11 +111,11 @@ def with_held(path: LoadPath | LineLoadPath) -> LoadTable:
 
 
 def to_and_fro(P: float, stroke: float, increments: int, angle: float = 0.0) -> LoadTable:
-    """Every increment of a way there and back, ``angle`` from x to y.
+    """Return the increments of a stroke there and back, at ``angle`` from x to y.
 
-    Motions are those of body 1 relative to body 2, which meet in the middle of the way: a contact
-    that slips in part remembers from where it first moved, and met at one end of the way its loop
-    would not be centred.
+    Motions are those of body 1 relative to body 2. The bodies meet in the middle of the stroke: a
+    contact in partial slip depends on where it first moved, and its loop would be off centre if the
+    bodies met at one end.
     """
     step = stroke / increments * np.array([np.cos(angle), np.sin(angle)])
     there = np.tile(step, (increments, 1))
@@ -125,13 +125,13 @@ def to_and_fro(P: float, stroke: float, increments: int, angle: float = 0.0) -> 
 
 
 class Stroke(Section):
-    """To and fro at constant speed under a constant normal force."""
+    """Reciprocating motion at constant speed under a constant normal force."""
 
     known_by: ClassVar[frozenset[str]] = frozenset({"stroke"})
 
 
 class Reciprocation(Stroke):
-    """Body 2 moves to and fro at constant speed under a constant normal force."""
+    """Body 2 moves back and forth at constant speed under a constant normal force."""
 
     P: PressingForce = entry("normal force [N]", "50 N")
     stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "20 um")
@@ -140,12 +140,12 @@ class Reciprocation(Stroke):
     tilt: Tilt = entry(TILTS, "held", default="held")
 
     def table(self) -> LoadTable:
-        """Every increment of the cycle."""
+        """Return every increment of the cycle."""
         return to_and_fro(self.P, self.stroke, self.increments, self.direction)
 
 
 class LineReciprocation(Stroke):
-    """Body 2 moves to and fro along x at constant speed under a constant normal force."""
+    """Body 2 moves back and forth along x at constant speed under a constant normal force."""
 
     P: PressingLineForce = entry("normal force [N/mm]", "50 N/mm")
     stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "20 um")
@@ -153,7 +153,7 @@ class LineReciprocation(Stroke):
     tilt: Tilt = entry(TILTS, "held", default="held")
 
     def table(self) -> LoadTable:
-        """Every increment of the cycle."""
+        """Return every increment of the cycle."""
         return to_and_fro(self.P, self.stroke, self.increments)
 
 
@@ -180,15 +180,15 @@ class Cycle(LegsOrFile[LegT], Generic[LegT]):
 
 
 class ContactCycle(Cycle[Leg]):
-    """Closed cycle of any loads, with contact.method: full but for motions along the face."""
+    """Closed cycle of any loads; all but motions along the face need ``contact.method: full``."""
 
 
 class LineContactCycle(Cycle[LineLeg]):
-    """Closed cycle of any loads, with contact.method: full but for motions along the face."""
+    """Closed cycle of any loads; all but motions along the face need ``contact.method: full``."""
 
 
 def _way(value: object) -> str:
-    """How a cycle is given: as a stroke, unless there are legs or a file."""
+    """Return the tag of a cycle: a stroke, unless it has legs or a file."""
     if isinstance(value, Section):
         return "(stroke)" if isinstance(value, Stroke) else "(cycle)"
     named = set(value) if isinstance(value, dict) else set()
@@ -218,7 +218,7 @@ LINK = "there is no structure to link the contact to: both bodies are half-space
 
 
 class BodiesWear(Wear):
-    """Wear of two bodies, and how far it goes."""
+    """Wear laws of two bodies, and length of the run."""
 
     cycles: Cycles = entry("of the whole run [1]", 1e5)
 
@@ -272,13 +272,13 @@ class TwoBodiesWearCase(WearCase):
 
     @property
     def size(self) -> tuple[float, float]:
-        """Of the grid along x and y [mm]; nothing ends along a line."""
+        """Size of the grid along x and y [mm]; infinite along the line of a line contact."""
         size = self.contact.size
         return size if isinstance(size, tuple) else (size, inf)
 
     @property
     def grid(self) -> Grid:
-        """That of the contact."""
+        """Grid of the contact."""
         return Grid.over(self.size, self.contact.grid, self.line)
 
     @model_validator(mode="after")
@@ -308,7 +308,7 @@ class TwoBodiesWearCase(WearCase):
 
     @property
     def splits(self) -> bool:
-        """True where increments are split as ``contact.accuracy`` asks; rows of a file are not."""
+        """Whether increments are split to meet ``contact.accuracy``; rows of a file are not."""
         path = self.load_path
         return self.contact.method == "full" and getattr(path, "file", None) is None
 
@@ -322,7 +322,7 @@ class TwoBodiesWearCase(WearCase):
 
 
 class BodiesWearCase(TwoBodiesWearCase):
-    """Two bodies that wear over an area of both directions."""
+    """Two bodies that wear over an area."""
 
     about: ClassVar[str] = "a ball, flat or measured heights that wear under a cycle of loads"
     line: ClassVar[bool] = False
@@ -348,7 +348,7 @@ class LineBodiesWearCase(TwoBodiesWearCase):
 
 
 def _check(case: TwoBodiesWearCase) -> None:
-    """Refuse what does not fit together: grid, heights, motions, materials and loops."""
+    """Refuse a grid, heights, motions, materials and loops that do not fit together."""
     if isinstance(case.structure, Heights):
         require_shape(case.structure.file, case.contact.grid)
     check_surfaces(case.structure, case.grid)
@@ -377,7 +377,7 @@ def _check(case: TwoBodiesWearCase) -> None:
 
 
 def _check_room(case: TwoBodiesWearCase, table: LoadTable) -> None:
-    """Refuse a stroke that is to be followed beyond the grid."""
+    """Refuse a stroke that leaves the grid, if its motion is to be followed."""
     reach = np.array([np.ptp(table[name]) for name in SHIFTS])
     stroke = float(np.hypot(*reach))
     if case.wear.motion == "neglect" or not stroke > 0.0:
@@ -395,7 +395,7 @@ def _check_room(case: TwoBodiesWearCase, table: LoadTable) -> None:
 
 
 def _in_words(path: LoadPath | LineLoadPath, force: str) -> str:
-    """A cycle in words, forces in the unit ``force``."""
+    """Return a description of a cycle, with forces in the unit ``force``."""
     table = path.table()
     steps = f"{len(table)} increments, tilt {path.tilt}"
     if isinstance(path, Reciprocation | LineReciprocation):
@@ -404,7 +404,7 @@ def _in_words(path: LoadPath | LineLoadPath, force: str) -> str:
 
 
 def _doubts(case: TwoBodiesWearCase) -> Iterator[str]:
-    """About loads and a stroke against the contact that they make, and heights of a file."""
+    """Yield plausibility warnings about loads, stroke and heights of a file."""
     bodies = case.materials.body_1, case.materials.body_2
     table, simple = case.load_path.table(), isinstance(case.load_path, Stroke)
     sides = (case.size[0], case.size[0]) if case.line else case.size

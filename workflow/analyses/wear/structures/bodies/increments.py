@@ -1,9 +1,9 @@
-"""Increments of a cycle of two bodies with friction of their own, and what they leave.
+"""Increments of a cycle of two bodies with friction, and the error due to them.
 
-The loads of such a cycle go straight from increment to increment, so that it is known what they are
-in between. Solved in twice as many increments it tells what those leave, of the friction and of the
-sums over increments together: Backward Euler is of first order, and the change by half as long ones
-is half of the error.
+The loads of such a cycle vary linearly from increment to increment, so that values in between are
+known. A solution in twice as many increments measures their error, that of friction and that of
+sums over increments together: backward Euler is of first order, and halving the increments removes
+half of the error.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ AnyCase = TypeVar("AnyCase", bound=TwoBodiesWearCase)
 
 
 def choose_parts(case: AnyCase) -> tuple[AnyCase, dict[str, Any] | None]:
-    """The case with increments that leave ``contact.accuracy`` of its unworn cycle, and why.
+    """Return the case with increments that meet ``contact.accuracy``, and a record of why.
 
-    Each is split into as many parts. No record where the case's own will do, or where no cycle can
-    be solved.
+    Each increment is split into the same number of parts. There is no record if the case's
+    increments suffice or no cycle can be solved.
     """
     begin, accuracy = time.perf_counter(), case.contact.accuracy
     rows, parts, tried = len(case.load_path.table()), 1, {}
@@ -73,7 +73,7 @@ def choose_parts(case: AnyCase) -> tuple[AnyCase, dict[str, Any] | None]:
 
 
 def finer_cycles(case: TwoBodiesWearCase, state: InterfaceState) -> list[CycleTractions]:
-    """Unworn cycle and that on the surfaces of ``state``, in twice as many increments.
+    """Return the unworn cycle and that on the surfaces of ``state``, in twice as many increments.
 
     Raises ContactFailure.
     """
@@ -90,9 +90,9 @@ def _staged(case: TwoBodiesWearCase, parts: int) -> tuple[FaceContact, Any]:
 
 
 def _cycle(case: TwoBodiesWearCase, parts: int) -> tuple[Array, float] | None:
-    """Friction work per area of an unworn cycle, and what its shear loads move; None: no solution.
+    """Return friction work per area and work of the shear loads of a cycle, or None if unsolved.
 
-    The latter in all increments by its size [N mm].
+    The second value sums the absolute work of all increments [N mm], per area of a cell.
     """
     stage, loads = _staged(case, parts)
     try:
@@ -110,7 +110,7 @@ def _cycle(case: TwoBodiesWearCase, parts: int) -> tuple[Array, float] | None:
 
 
 def _change(coarse: tuple[Array, float] | None, fine: tuple[Array, float] | None) -> float:
-    """Relative change of depth or energy, the larger; inf where one of them is not known."""
+    """Return the larger relative change of depth and energy; inf if a cycle is unknown."""
     if coarse is None or fine is None:
         return np.inf
     (before, _), (work, moved) = coarse, fine
@@ -122,7 +122,7 @@ def _change(coarse: tuple[Array, float] | None, fine: tuple[Array, float] | None
 
 
 def _divided(case: TwoBodiesWearCase, parts: int) -> dict[str, Any]:
-    """Entries for so many parts of each increment."""
+    """Return the case entries that split each increment into ``parts``."""
     path = case.load_path
     if isinstance(path, Stroke):
         return {"load_path.increments": parts * path.model_dump()["increments"]}

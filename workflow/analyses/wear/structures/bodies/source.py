@@ -1,4 +1,4 @@
-"""Two bodies under a cycle of forces and motions as a load source: nothing responds to wear."""
+"""Loads of two bodies under a cycle of forces and motions, which wear does not change."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ REMEDY = "enlarge contact.size, and contact.grid with it"
 
 
 class BodiesSource(UncoupledSource):
-    """Two bodies as load source of a wear run: a cycle of forces and motions.
+    """Loads of a wear run of two bodies: a cycle of forces and motions.
 
-    Loads that nobody imposes are those of bodies that slide as a whole, along the face, and of the
-    unworn contact across it. What forces alone dissipate is for the half-space to find. Every
-    increment of the case is passed in so many ``parts``.
+    Loads that are not imposed are those of sliding bodies along the face, and of the unworn contact
+    across it. The half-space finds the dissipation under forces alone. Every increment of the case
+    is split into ``parts``.
     """
 
     def __init__(self, case: TwoBodiesWearCase, parts: int = 1) -> None:
@@ -59,10 +59,10 @@ class BodiesSource(UncoupledSource):
         self.slip_known = bool(self.motion.any())
 
     def _peak(self) -> int:
-        """The increment of the largest normal force, and there of the largest shear force."""
+        """Return the increment with the largest shear force among those with the largest P."""
         path = self._case.load_path
         if isinstance(path, Reciprocation | LineReciprocation):
-            return self._parts * path.increments // 2  # that passes the middle on the way there
+            return self._parts * path.increments // 2  # mid-stroke, on the way there
         heaviest, shear = self._normal_force, np.hypot(self._table["Qx"], self._table["Qy"])
         loaded = heaviest >= (1.0 - SAME) * heaviest.max()
         return first_largest(np.where(loaded, shear, -1.0))
@@ -87,26 +87,26 @@ class BodiesSource(UncoupledSource):
     def worn(
         self, depths: Sequence[Array], friction: Sequence[float] | None = None
     ) -> tuple[CycleLoads, ...]:
-        """As unworn but for the friction: no structure responds to wear."""
+        """Return the unworn cycle with the present friction: no structure responds to wear."""
         return self._cycle(*friction) if friction else self.unworn()
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
-        """None: the bodies have no nodes."""
+        """Return no faces: the bodies have no nodes."""
         return ()
 
     @cached_property
     def motion(self) -> Array:
-        """Motion of body 2 over body 1 that is imposed in each increment, ``(t, 2)`` [mm]."""
+        """Imposed motion of body 2 over body 1 in each increment ``(t, 2)`` [mm]."""
         shift = np.stack([self._table[name] for name in SHIFTS], axis=1)
         return np.roll(shift, 1, axis=0) - shift
 
     def _cycle(self, friction: float) -> tuple[CycleLoads]:
-        """The cycle of the only contact."""
+        """Return the cycle of the only contact."""
         slip = np.repeat(self.motion[:, :, None], len(self.faces[0].face), axis=2)
         return (CycleLoads(self._loads(friction), slip),)
 
     def _loads(self, friction: float) -> LoadHistory:
-        """Forces as imposed; where motions are, friction against these and what it dissipates."""
+        """Return imposed forces, with friction and dissipation where motions are imposed."""
         table, motion, P = self._table, self.motion, self._normal_force
         Qx, Qy = table["Qx"], table["Qy"]
         sliding = motion.any(axis=1) & (P > 0.0)
@@ -121,7 +121,7 @@ class BodiesSource(UncoupledSource):
 
     @cached_property
     def _normal_force(self) -> Array:
-        """Normal force in each increment ``(t,)``: of the unworn contact where motions press."""
+        """Normal force per increment ``(t,)``; that of the unworn contact where motions press."""
         table, drive = self._table, self.drive
         if not drive.motion[0]:
             return table["P"]
@@ -146,7 +146,7 @@ class BodiesSource(UncoupledSource):
 
 
 def in_parts(table: LoadTable, parts: int) -> LoadTable:
-    """Each increment of a closed cycle in so many equal parts."""
+    """Return a closed cycle with each increment split into equal ``parts``."""
     if parts == 1:
         return table
     shares = np.arange(1, parts + 1) / parts
@@ -159,7 +159,7 @@ def in_parts(table: LoadTable, parts: int) -> LoadTable:
 
 
 def gap_of(bodies: Shape | Heights, grid: Grid) -> GapFunction:
-    """Gap [mm] of the unloaded bodies at x and y of the face that ``grid`` covers."""
+    """Return the gap [mm] of the unloaded bodies over the face that ``grid`` covers."""
     if isinstance(bodies, Heights):
         form: GapFunction = GridHeights(grid, read_heights(bodies.file))
     else:

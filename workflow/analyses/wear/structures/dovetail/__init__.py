@@ -16,25 +16,25 @@ if TYPE_CHECKING:
     from workflow.models.contact import FaceContact
     from workflow.models.structure import StructureModel
 
-# Fields per cell and increment: slips, depths per pressure, pressures, starts.
+# Stored fields per cell and increment: slips, depths per pressure, pressures, starts.
 FIELDS = 12
-# Nodes of both bodies in space, for every node of a flank and by their volume; of quadratic
-# elements so many times more.
+# Nodes of both bodies in space, per node of a flank and by their volume; the factor for quadratic
+# elements.
 FLANK_NODES, VOLUME_NODES, QUADRATIC = 40.0, 1.5, 7.0
-# Of the difference to a mesh of half the size, of elements of second order: all of the error of
-# first order, and of second order what Richardson makes of it.
+# Factor from the difference to a mesh of half the size and second order to the error of the mesh:
+# all of it for first order, Richardson's factor for second order.
 MESH_SHARES = {1: 1.0, 2: 4.0 / 3.0}
 
 
 def _model(case: DovetailCase) -> StructureModel:
-    # Finite elements take a second to load: where they are used.
+    # Finite elements take a second to import, so they are imported only where they are used.
     from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 
     return dovetail_joint(case)
 
 
 def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
-    """In space the nodes of both flanks are known beforehand, and all increments are kept."""
+    """Return the memory of a run; in space, flank nodes are known and all increments are stored."""
     kept = SPECTRA
     if case.structure.dimension == 3:
         interface_nodes = 2 * prod(case.mesh.flank_nodes)
@@ -44,7 +44,7 @@ def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Mem
 
 
 def _extent(case: DovetailCase) -> Extent:
-    """In space the nodes grow from the flanks into both bodies."""
+    """Return the extent of the loads; in space, nodes are counted from the flanks inwards."""
     across, along = case.mesh.flank_nodes
     structure, faces = case.structure, 2
     increments = len(case.load_path.shares) * sum(case.expected_legs)
@@ -82,9 +82,9 @@ def _warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[s
 
 
 def _finer(case: DovetailCase) -> Finer[DovetailCase]:
-    """The section on a mesh of half the size and second order, for the joint in space too.
+    """Return the section on a mesh of half the size and second order, also for a 3D joint.
 
-    What the mesh leaves along the slot is not in it.
+    The error due to the mesh along the slot is not included.
     """
     from workflow.analyses.wear.fidelity.probe import plane_section
 
@@ -99,7 +99,7 @@ def _finer(case: DovetailCase) -> Finer[DovetailCase]:
 
 
 def _settings(case: DovetailCase) -> dict[str, str]:
-    """Return what makes the errors of mesh and link smaller: elements of half the size."""
+    """Return the settings that reduce the errors of mesh and link: elements of half the size."""
     across, along = case.mesh.flank_nodes
     nodes = f"mesh.flank_nodes: [{2 * across - 1}, {2 * along - 1}]"
     finer = f"{nodes} and mesh.size: {0.5 * case.mesh.size:g} mm"

@@ -1,4 +1,4 @@
-"""A dovetail case: a blade root in its disk, its mission, its flanks and how they wear."""
+"""A dovetail case: a blade root in its disk, its mission, its flanks and their wear."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ RotationSpeed = Annotated[
 Moment = Annotated[
     float, Quantity("N*mm", at_least=-1e9, at_most=1e9, range_text="-1e6 N*m to 1e6 N*m")
 ]
-# Where a case has surfaces as measured.
+# Entry of measured surfaces.
 SURFACES = "structure.surfaces"
-# The flank at X > 0 and the one at X < 0.
+# Signs of X at the flanks.
 SIDES = {"intrados": 1, "extrados": -1}
 LegIncrements = Annotated[int, Whole(1, 10_000)]
 FlankNodes = Annotated[int, Whole(3, 2000)]
@@ -106,7 +106,7 @@ class Dovetail(Section):
 
     @property
     def flanks(self) -> str:
-        """Their sizes in a line."""
+        """Sizes of the flanks in a line."""
         sizes = f"{plain(self.flank_length, 'mm')} flat at {plain(self.flank_angle, 'rad')}"
         rounded = f"{plain(self.edge_width, 'mm')} with {plain(self.edge_radius, 'mm')}"
         along = f", {plain(self.slot_length, 'mm')} long" if self.dimension == 3 else ""
@@ -114,7 +114,7 @@ class Dovetail(Section):
 
     @property
     def face_width(self) -> float:
-        """Flat and both rounded edges of a flank, across the slot [mm]."""
+        """Width of a flank across the slot, with both rounded edges [mm]."""
         return self.flank_length + 2.0 * self.edge_width
 
     @property
@@ -190,15 +190,15 @@ class Dovetail(Section):
         return self
 
     def geometry(self) -> Geometry:
-        """The joint as the mesher takes it."""
+        """Return the joint as the mesher takes it."""
         from fe_models.geometry.dovetail import Dovetail as Geometry
 
         return Geometry(**self.model_dump(exclude={"kind", "dimension", "sides", "surfaces"}))
 
     def meshed(self, mesh: Mesh) -> StructureMesh:
-        """Return both bodies without surfaces as measured. Raises MeshError.
+        """Return the mesh of both bodies without measured surfaces. Raises MeshError.
 
-        A look at the case and the run that follows it share the mesh.
+        The mesh is cached, so that a check and the run that follows it share it.
         """
         from workflow.models.dovetail import dovetail_mesh
 
@@ -216,7 +216,7 @@ def _require_below(section: Section, key: str, limit: float, name: str) -> None:
 
 
 class MissionOfMix(Section):
-    """One of several missions; what it does not name is that of load_path."""
+    """One of several missions; entries that it does not give are those of ``load_path``."""
 
     share: Share = entry("of all cycles; the shares add up to 1 [1]", "100 %")
     rotation_speed: RotationSpeed | None = entry("at the peak [rad/s]", "5000 rpm", default=None)
@@ -274,7 +274,7 @@ class LoadPath(Section):
         return tuple(mission.share for mission in self.mix) or (1.0,)
 
     def missions(self) -> list[dict[str, Any]]:
-        """The entries of every mission of the mix."""
+        """Return the entries of every mission of the mix."""
         up, down = (0, 0) if self.increments == AUTO else self.legs
         counts = {"increments": up + down, "peak_at": up}
         entries = counts | self.model_dump(exclude={"mix", "increments"})
@@ -285,13 +285,13 @@ class LoadPath(Section):
 
     @property
     def heaviest(self) -> int:
-        """The mission of the highest speed, of several the one of the largest moment."""
+        """Index of the mission with the highest speed and, among equal ones, the largest moment."""
         peaks = [(m["rotation_speed"], abs(m["aerodynamic_moment"])) for m in self.missions()]
         return peaks.index(max(peaks))
 
     @property
     def legs(self) -> tuple[int, int]:
-        """Increments up to the peak and after it, once they are chosen."""
+        """Increments up to the peak and after it, which must be chosen by then."""
         assert isinstance(self.increments, tuple)
         return self.increments
 
@@ -359,7 +359,7 @@ class DovetailCase(FiniteElementCase):
         return rows
 
     def _peak_loads(self) -> Iterator[str]:
-        """What loads the blade at the peak of its heaviest mission."""
+        """Yield the loads of the blade at the peak of its heaviest mission, in words."""
         heaviest = self.load_path.missions()[self.load_path.heaviest]
         yield plain(heaviest["rotation_speed"], "rad/s")
         mass, radius = self.load_path.airfoil_mass, self.load_path.airfoil_radius
@@ -376,7 +376,7 @@ class DovetailCase(FiniteElementCase):
 
     @property
     def to_plane(self) -> dict[str, Any]:
-        """Entries that differ in the section in plane strain: a flank's surfaces are none of it."""
+        """Entries that turn the case into its plane-strain section, without measured surfaces."""
         entries: dict[str, Any] = {"structure.dimension": 2, "structure.skew": 0.0}
         return entries | ({} if self.structure.dimension == 2 else {SURFACES: None})
 
@@ -397,7 +397,7 @@ class DovetailCase(FiniteElementCase):
             )
 
     def _flank_grid(self, name: str) -> Grid:
-        """The grid over a flank."""
+        """Return the contact grid over a flank."""
         size = self.structure.geometry().flank_size(SIDES[name])
         return Grid.over(size, self.contact.grid, self.structure.dimension == 2)
 
@@ -409,7 +409,7 @@ class DovetailCase(FiniteElementCase):
         width, length = self.face_sides()
         pressure = self._pull / (2.0 * width * length * cos(self.structure.flank_angle))
         yield from pressed("load_path", pressure, self.yields)
-        # One of the flanks carries nothing where the pull acts outside of both.
+        # One of the flanks carries nothing if the pull acts outside of both.
         arm, moment = 0.5 * self.structure.neck_width, abs(self.load_path.aerodynamic_moment)
         if moment > arm * self._pull:
             yield (
@@ -440,7 +440,7 @@ class DovetailCase(FiniteElementCase):
 
     @model_validator(mode="after")
     def _surfaces_fit(self) -> DovetailCase:
-        """Refuse surfaces as measured that no flank has room for, or that no probe knows."""
+        """Refuse measured surfaces that do not fit a flank or automatic fidelity."""
         if self.structure.surfaces is None:
             return self
         if self.fidelity == "auto":

@@ -8,12 +8,12 @@ from sa_solver.reference.flat_rounded import FlatRoundedPunch
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.models.contact import FaceContact
 
-# Share of the closed form's edge peak that the grid may miss.
+# Share of the edge peak, from a closed form, that the grid may miss.
 PEAK_ERROR = 0.05
 
 
 def warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[str]:
-    """What to say of each edge whose peak the grid misses."""
+    """Yield a warning for each edge whose pressure peak the grid misses."""
     for edge, error in edge_peak_errors(case, stage, load).items():
         if abs(error) > PEAK_ERROR:
             yield (
@@ -23,10 +23,10 @@ def warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[st
 
 
 def edge_peak_errors(case: DovetailCase, stage: FaceContact, load: float) -> dict[str, float]:
-    """What the grid makes of the closed form's edge peaks, relative, under a centred ``load``.
+    """Return the relative error of edge peaks on the grid, under a centred ``load``.
 
-    The plane strain profile across the flank stands for both: the peak at the slot ends is set by
-    the same short side.
+    The plane strain profile across the flank represents both kinds of edges: the peak at the slot
+    ends is set by the same short side. The reference is the closed form.
     """
     if load <= 0.0:
         return {}

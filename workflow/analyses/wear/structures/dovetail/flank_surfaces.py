@@ -1,4 +1,4 @@
-"""Surfaces as measured on the flanks of a dovetail: case entries."""
+"""Measured surfaces on the flanks of a dovetail, as sections of a case."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FLANKS = ("intrados", "extrados")
 
 
 class FlankSurfaces(SurfacesOfTwo):
-    """Those of the disk, the blade or both: rows up the flank, across the slot."""
+    """Measured surfaces of one flank on disk, blade or both: rows up the flank, across the slot."""
 
     names: ClassVar[tuple[str, str]] = ("disk", "blade")
     also_filled_in: ClassVar[tuple[str, ...]] = ("disk",)
@@ -29,7 +29,7 @@ class FlankSurfaces(SurfacesOfTwo):
 
 
 class MeasuredFlanks(Section):
-    """Those of either flank or both, on top of its flat and its rounded edges."""
+    """Measured surfaces of one or both flanks, added to the flat with its rounded edges."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("intrados",)
     in_schema: ClassVar[Mapping[str, Any]] = one_of(*FLANKS)
@@ -49,6 +49,6 @@ class MeasuredFlanks(Section):
 
     @property
     def flanks(self) -> dict[str, FlankSurfaces]:
-        """Those that there are, by the name of their flank."""
+        """The measured surfaces that are given, by the name of their flank."""
         both = {name: getattr(self, name) for name in FLANKS}
         return {name: surfaces for name, surfaces in both.items() if surfaces is not None}

@@ -1,4 +1,4 @@
-"""A dovetail case as a model of its structure."""
+"""Translation of a dovetail case into a model of its structure."""
 
 from __future__ import annotations
 
@@ -39,5 +39,5 @@ def section_joint(case: DovetailCase) -> DovetailJoint:
 
 
 def added_gap(face: ScannedFace) -> AddedGap:
-    """Return the gap of surfaces as measured: on cells as they are, at nodes their means."""
+    """Return the gap of measured surfaces: their values on cells, their means at nodes."""
     return AddedGap(face.over, face.at_nodes)

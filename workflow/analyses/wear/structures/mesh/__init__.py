@@ -1,4 +1,4 @@
-"""Two bodies of a mesh or CAD file of the user's."""
+"""Bodies of a mesh or CAD file of the user."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from workflow.shell.memory import Memory
 if TYPE_CHECKING:
     from workflow.models.structure import StructureModel
 
-# Dense matrices of the interfaces at once while more than two bodies are joined: of 12 blocks on
-# each other 9.6.
+# Number of dense interface matrices held while more than two bodies are joined: 9.6 for a stack of
+# 12 blocks.
 OF_MANY = 10
-# Nodes in space of which elements of second order, seven times as many, are still cheap.
+# Largest number of nodes in space for cheap second-order elements, which have seven times as many.
 MOST_NODES = 4000
 
 
 def _model(case: MeshCase) -> StructureModel:
-    # Finite elements take a second to load: where they are used.
+    # Finite elements take a second to import, so they are imported only where they are used.
     from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 
     return mesh_assembly(case)
 
 
 def _extent(case: MeshCase) -> Extent:
-    """As the file has it, which a check reads anyway."""
+    """Return the extent of the loads, from the file that a check reads anyway."""
     mesh, cycles = case.structure.mesh(case.mesh.size), max(1, len(case.load_path.mix))
     return Extent(
         cycles * sum(case.expected_legs),
@@ -45,7 +45,7 @@ def _extent(case: MeshCase) -> Extent:
 
 
 def _finer(case: MeshCase) -> Finer[MeshCase] | None:
-    """The mesh with elements of second order, where it has others and is small enough."""
+    """Return the mesh with second-order elements, if it has first-order ones and is small."""
     mesh = case.structure.mesh(case.mesh.size)
     cheap = mesh.interfaces[0].line or mesh.node_count(1) <= MOST_NODES
     return Finer({"mesh.order": 2}) if case.mesh.order == 1 and cheap else None
@@ -72,7 +72,7 @@ def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
 
 
 def _settings(case: MeshCase) -> dict[str, str]:
-    """Return what makes the error of the mesh smaller; only CAD is meshed at a size."""
+    """Return the setting that reduces the error of the mesh; only CAD is meshed at a size."""
     size = case.mesh.size
     finer = "a finer mesh" if size is None else f"mesh.size: {0.5 * size:g} mm"
     return {"mesh": f"mesh.order: 2, or {finer}" if case.mesh.order == 1 else finer}

@@ -1,4 +1,4 @@
-"""A wear case whose structure is a mesh or CAD file of the user's."""
+"""A wear case whose structure is a mesh or CAD file of the user."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ Stamp = tuple[int, int]
 
 
 class ImportedStructure(Section):
-    """Two bodies from a file.
+    """Two or more bodies from a file.
 
-    Tetrahedra and hexahedra, or triangles and quadrilaterals in plane strain: coordinates of a
-    plane mesh are called X and Z.
+    Elements are tetrahedra and hexahedra, or triangles and quadrilaterals in plane strain. The
+    coordinates of a plane mesh are called X and Z.
     """
 
     refused: ClassVar[Mapping[str, str]] = {
@@ -136,25 +136,25 @@ class ImportedStructure(Section):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all bodies in the file, in the order of the mesh."""
+        """Names of all bodies in the file, in the order of the mesh."""
         return self.body_1, self.body_2, *(body.name for body in self.other_bodies)
 
     def bodies_of(self, pair: ContactPair) -> tuple[str, str]:
-        """Names of body 1 and body 2 of a contact."""
+        """Return the names of body 1 and body 2 of a contact."""
         return pair.bodies or (self.body_1, self.body_2)
 
     def read(self, size: float | None) -> ImportedMesh:
-        """Everything in the file, read once, CAD by elements of a ``size``. Raises MeshError."""
+        """Return the cached contents of the file; CAD is meshed with ``size``. Raises MeshError."""
         return _read(self.file, size, self.length_unit, _stamp(self.file))
 
     def mesh(self, size: float | None, order: int = 1) -> StructureMesh:
-        """Bodies with interfaces, made once, of order 2 with midside nodes. Raises MeshError."""
+        """Return the cached mesh with interfaces, for elements of ``order``. Raises MeshError."""
         made = _joined if order == 1 else _curved
         return made(self, size, _stamp(self.file))
 
 
-# Reading or meshing takes seconds for every 100 000 elements: a check and the run that follows it
-# share what they find.
+# Reading or meshing takes seconds for every 100 000 elements, so that a check and the run that
+# follows it share the cached results.
 @lru_cache(maxsize=1)
 def _read(file: str, size: float | None, unit: str | None, stamp: Stamp) -> ImportedMesh:
     from fe_models.geometry.imported import read_bodies
@@ -179,13 +179,13 @@ def _curved(structure: ImportedStructure, size: float | None, stamp: Stamp) -> S
 
 
 def _stamp(file: str) -> Stamp:
-    """Time and size by which a file that has changed is known."""
+    """Return time and size of a file, by which a change is recognised."""
     state = Path(file).stat()
     return state.st_mtime_ns, state.st_size
 
 
 class Elements(Section):
-    """Elements of the structure: those of the file, or made for its shapes."""
+    """Elements of the structure: those of a mesh file, or generated for CAD shapes."""
 
     size: Length | None = entry("for CAD files only [mm]", "2 mm", default=None)
     order: Literal[1, 2] = entry("of the elements; 2 has the file's midside nodes", 1, default=1)
@@ -196,7 +196,7 @@ class MeshMaterials(TwoBodies[MeshMaterial]):
 
 
 class MeshCase(FiniteElementCase):
-    """Bodies from a file under loads of the user's."""
+    """Bodies from a file under user-defined loads."""
 
     about: ClassVar[str] = "two bodies of your own mesh or CAD file under your loads"
 
@@ -219,7 +219,7 @@ class MeshCase(FiniteElementCase):
         return self.load_path.legs[before:]
 
     def divided(self, legs: Sequence[int]) -> dict[str, Any]:
-        """Of legs before the cycle, which are passed once, each has as many as the finest."""
+        """Return the entries for increments; legs before the cycle, passed once, get the most."""
         before = (max(legs),) * (self.load_path.cycle_from - 1)
         return {"load_path.increments": (*before, *legs)}
 
@@ -251,7 +251,7 @@ class MeshCase(FiniteElementCase):
         ]
 
     def doubts(self) -> Iterator[str]:
-        """What the file says besides its mesh; faces that hardly meet, as parts of a face do."""
+        """Yield plausibility warnings about file, lengths, elements and contacts."""
         yield from super().doubts()
         imported = self.structure.read(self.mesh.size)
         if left := imported.left:
@@ -333,7 +333,7 @@ class MeshCase(FiniteElementCase):
 
     @property
     def _keyed_solids(self) -> dict[str, tuple[str, MeshMaterial]]:
-        """Names and materials of all bodies by where the case has the latter."""
+        """Names and materials of all bodies by the case entry of the material."""
         keys = ["materials.body_1", "materials.body_2"]
         others = range(len(self.structure.other_bodies))
         keys += [f"structure.other_bodies.{index}.material" for index in others]
@@ -381,7 +381,7 @@ class MeshCase(FiniteElementCase):
 
     @model_validator(mode="after")
     def _fits_the_file(self) -> MeshCase:
-        """Every name is in the file, the faces meet and body 1 is held."""
+        """Refuse names that are not in the file, faces that do not meet and a body 1 not held."""
         structure = self.structure
         with _pointing_at("structure.file"):
             imported = structure.read(self.mesh.size)
@@ -423,7 +423,7 @@ class MeshCase(FiniteElementCase):
                 check_load(imported, every, load.described())
 
     def _check_contacts(self) -> None:
-        """Make the interfaces; where they cannot be, find the pair that is at fault."""
+        """Make and check the interfaces; if they cannot be made, find the contact at fault."""
         structure, size = self.structure, self.mesh.size
         try:
             interfaces = structure.mesh(size).interfaces
@@ -447,7 +447,7 @@ class MeshCase(FiniteElementCase):
                 scanned.check_mirrored()
 
     def _check_supports(self, imported: ImportedMesh) -> None:
-        """Build what holds the bodies, on elements of order 1 and without forces."""
+        """Build supports and ties of the bodies, with elements of order 1 and without forces."""
         from fe_models.imported_structure import imported_structure
         from fe_models.loads.pretension import Pretension, bolt_section
 
@@ -476,7 +476,7 @@ class MeshCase(FiniteElementCase):
 
 @contextmanager
 def _pointing_at(key: str) -> Iterator[None]:
-    """Say of a mesh that cannot be used which entry asks for it."""
+    """Report a mesh error as a disagreement at the case entry ``key``."""
     try:
         yield
     except MeshError as error:

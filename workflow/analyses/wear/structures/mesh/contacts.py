@@ -1,4 +1,4 @@
-"""Bodies, contacts and supports of a user's mesh, as a case names them."""
+"""Bodies, contacts and supports of a user's mesh, as sections of a case."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Faces = Annotated[tuple[Name, ...], OrAlone()]
 
 
 class MeshMaterial(Solid):
-    """Isotropic linear elastic material, with a mass where that counts."""
+    """Isotropic linear elastic material, with a density where loads need it."""
 
     density: Density | None = entry(
         "mass per volume, for loads of rotation and acceleration [t/mm^3]",
@@ -37,7 +37,7 @@ class MeshMaterial(Solid):
 
 
 class OtherBody(Section):
-    """A body beside body 1 and body 2."""
+    """A body in addition to body 1 and body 2."""
 
     name: Name = entry("in the file", "bolt")
     material: MeshMaterial = entry("of the body")
@@ -101,14 +101,14 @@ class ContactPair(Section):
         return self
 
     def described(self, bodies: tuple[str, str]) -> fe.ContactPair:
-        """As the structure takes it, of body 1 and body 2."""
+        """Return the contact between ``bodies`` 1 and 2 as the structure takes it."""
         from fe_models.imported_structure import ContactPair as Pair
 
         return Pair(self.name, bodies, self.face_1, self.face_2, np.array(self.x))
 
 
 def own_terms(pair: ContactPair) -> str:
-    """What a contact has of its own, in words; empty if nothing."""
+    """Return the settings specific to a contact, in words; empty if there are none."""
     parts = []
     if pair.bodies is not None:
         parts.append(f"between {pair.bodies[0]} and {pair.bodies[1]}")
@@ -125,7 +125,7 @@ def own_terms(pair: ContactPair) -> str:
 
 
 class Support(Section):
-    """Displacements held at a boundary or a node set, of whichever body has it."""
+    """Displacements held at a boundary or a node set of any body."""
 
     group: Name = entry("boundary or node set", "disk_base")
     hold: Literal[
@@ -135,7 +135,7 @@ class Support(Section):
     )
 
     def described(self) -> fe.Support:
-        """As the structure takes it."""
+        """Return the support as the structure takes it."""
         from fe_models.imported_structure import Support as Held
 
         return Held(self.group, "xyz" if self.hold == "all" else self.hold)

@@ -1,4 +1,4 @@
-"""Cyclic symmetry of the bodies of a user's mesh, as a case gives it."""
+"""Cyclic symmetry of the bodies of a user's mesh, as a section of a case."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ if TYPE_CHECKING:
     from workflow.analyses.wear.structures.mesh.contacts import Support
     from workflow.analyses.wear.structures.mesh.loads import Load
 
-# Cuts that are images to so much [mm] are exact: nothing is said of it.
+# Distance between matching cuts [mm] up to which they count as exact and nothing is reported.
 EXACT = 1e-9
 
 Boundaries = Annotated[tuple[Name, ...], OrAlone()]
 
 
 class CyclicCuts(Section):
-    """The bodies are one of equal sectors of a wheel, with loads that are equal in each.
+    """Cyclic symmetry: the bodies are one of equal sectors of a wheel, with equal loads in each.
 
-    What one cut does the other does, turned by 360°/sectors about the axis (nodal diameter 0).
+    The displacements of both cuts are equal, turned by 360°/sectors about the axis (nodal diameter
+    0).
     """
 
     low: Boundaries = entry("boundary of one cut of a body, or several that are one", "disk_low")
@@ -50,14 +51,14 @@ class CyclicCuts(Section):
         return self
 
     def described(self) -> fe.Cyclic:
-        """As the structure takes it."""
+        """Return the cuts as the structure takes them."""
         from fe_models.cyclic.cuts import Cyclic
 
         axis, through = np.array(self.axis), np.array(self.through)
         return Cyclic(self.low, self.high, axis, through, self.sectors)
 
     def outline(self, mesh: StructureMesh) -> str:
-        """What a user should see of the cuts before anything runs."""
+        """Return a description of the cuts for the outline before a run."""
         from fe_models.cyclic.sector import sector_cuts
 
         low, high = (" + ".join(names) for names in (self.low, self.high))
@@ -70,7 +71,7 @@ class CyclicCuts(Section):
 
 
 class _Structure(Protocol):
-    """What is asked of a structure."""
+    """A structure section with cuts, supports and loads."""
 
     @property
     def cyclic(self) -> Sequence[CyclicCuts]: ...
@@ -86,10 +87,10 @@ def check_sector(
     numbers: Mapping[str, Indices],
     pointing_at: Callable[[str], AbstractContextManager[None]],
 ) -> None:
-    """Find the pair of cuts that is none, or what is not alike in all sectors.
+    """Refuse cuts that do not match, and supports or loads that differ between sectors.
 
-    ``numbers`` are those of the nodes in the file, by body; ``pointing_at`` says of which entry a
-    :class:`MeshError` is.
+    ``numbers`` are the node numbers of the file, by body; ``pointing_at`` attributes a
+    :class:`MeshError` to a case entry.
     """
     from fe_models.cyclic.sector import (
         check_alike,

@@ -1,4 +1,4 @@
-"""What is used of the midside nodes of a mesh, told before anything runs."""
+"""Report on the use of a mesh's midside nodes before a run."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh
     from fe_models.meshes.structure_mesh import Interface, StructureMesh
 
-# Midside nodes of faces that meet node to node are apart by more than this share of the face.
+# Distance of midside nodes of matching faces, relative to the face, that counts as a difference.
 APART = 1e-6
 
 
 def elements_outline(mesh: StructureMesh, imported: ImportedMesh, order: int) -> Iterator[str]:
-    """How curved the elements are of each body; nothing where neither file nor case says of it."""
+    """Yield how curved the elements of each body are, if file or case have midside nodes."""
     from fe_models.meshes.second_order import curvature
 
     known = {body.name: curvature(body, imported) for body in mesh.bodies}
@@ -42,7 +42,7 @@ def elements_outline(mesh: StructureMesh, imported: ImportedMesh, order: int) ->
 
 
 def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[str]:
-    """Doubts about elements that midside nodes would fold, and what is done about them."""
+    """Yield warnings about elements that midside nodes would fold, and how they are treated."""
     from fe_models.meshes.second_order import curvature
 
     for body in mesh.bodies:
@@ -57,7 +57,7 @@ def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[str
 
 
 def apart(mesh: StructureMesh, interface: Interface) -> str:
-    """A doubt about faces that meet node to node, but for their midside nodes; empty if none."""
+    """Return a warning about matching faces whose midside nodes differ, or an empty string."""
     from fe_models.meshes.second_order import distance_of_midsides
 
     between = distance_of_midsides(interface, [mesh.bodies[place] for place in interface.bodies])

@@ -1,4 +1,4 @@
-"""What a user should see of the faces of a mesh that meet, before anything runs."""
+"""Outline and checks of the contact faces of a mesh before a run."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from workflow.case.plain import counted, shape_in_words
 from workflow.case.sections import Section, disagreement
 from workflow.models.faces import face_size, planes_of_symmetry
 
-# Faces are shared but for rounding; and usually the smaller one all but for the clearance of a
-# bolt's hole, an eighth of what is under its head.
+# Relative rounding error of shared areas; and the least shared part of the smaller face, which may
+# lack the clearance of a bolt hole, an eighth of the area under the head.
 SHARED, WHOLE = 1e-6, 0.8
 
 
 def outline_of(mesh: StructureMesh, interface: Interface, gap: Section | None) -> str:
-    """What a user should see of an interface, and of the gap given it, before running it."""
+    """Return a description of an interface and its added gap for the outline before a run."""
     meet = "meet node to node" if interface.projection is None else "do not match"
     area = f"{interface.nodal_areas.sum():.4g} {_unit(interface)}"
-    # Rounded, as planes of a mesh file are off by its last digits.
+    # Rounded, because planes of a mesh file differ in the last digits.
     low, high = (round(float(gap), 9) + 0.0 for gap in (interface.gap.min(), interface.gap.max()))
     more = "" if gap is None else f" and {shape_in_words(gap)}"
     cut = ""
@@ -38,14 +38,14 @@ def outline_of(mesh: StructureMesh, interface: Interface, gap: Section | None) -
 
 
 def _unit(interface: Interface) -> str:
-    """Of areas, or of lengths in a line contact."""
+    """Return the unit of areas, or of lengths in a line contact."""
     return "mm" if interface.line else "mm²"
 
 
 def _areas(mesh: StructureMesh, interface: Interface) -> tuple[float, float, float]:
-    """What both bodies share of an interface, and their whole faces [mm²]; lengths [mm] of a line.
+    """Return shared and whole areas of an interface [mm²]; lengths [mm] of a line contact.
 
-    Seen along the normal.
+    Areas are projected along the normal.
     """
     z = interface.frame.axes[2]
     bodies = (mesh.bodies[place] for place in interface.bodies)
@@ -54,7 +54,7 @@ def _areas(mesh: StructureMesh, interface: Interface) -> tuple[float, float, flo
 
 
 def _beside(mesh: StructureMesh, interface: Interface) -> str:
-    """How much both faces have that is not shared."""
+    """Return the whole areas of both faces, in words, if they are not fully shared."""
     shared, *whole = _areas(mesh, interface)
     if all(abs(area / shared - 1.0) < SHARED for area in whole):
         return ""
@@ -62,7 +62,7 @@ def _beside(mesh: StructureMesh, interface: Interface) -> str:
 
 
 def _curved(interface: Interface) -> str:
-    """How far the surfaces are off the facets of their meshes, and how that is known."""
+    """Return how far the surfaces are off the facets of their meshes, and the source, in words."""
     parts = []
     for number in (1, 2):
         surface = interface.face(number).surface
@@ -77,7 +77,7 @@ def _curved(interface: Interface) -> str:
 
 
 def hardly_met(mesh: StructureMesh, interface: Interface) -> str:
-    """A doubt about faces of which much is not shared; empty where there is none."""
+    """Return a plausibility warning about faces that share little, or an empty string."""
     shared, *whole = _areas(mesh, interface)
     if shared >= WHOLE * min(whole):
         return ""
@@ -88,7 +88,7 @@ def hardly_met(mesh: StructureMesh, interface: Interface) -> str:
 
 
 def check_mirrored(gap: Gap, planes: Sequence[int], key: str) -> None:
-    """Refuse heights that are not their own image across the ``planes`` that cut their face."""
+    """Refuse heights that are not symmetric about the ``planes`` that cut their face."""
     if not isinstance(gap, HeightsGap):
         return
     heights = read_heights(gap.file)

@@ -1,4 +1,4 @@
-"""Legs of the load path of a user's mesh, and cycles that are mixed."""
+"""Legs of the load path of a user's mesh, and mixes of cycles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from workflow.case.sections import Section, disagreement, entry
 
 
 class CycleOfMix(Section):
-    """One of several cycles, in which every load has its own factor."""
+    """One of several cycles, with a factor on every load."""
 
     share: Share = entry("of all cycles; the shares add up to 1 [1]", "100 %")
     factors: tuple[Factor, ...] = entry(
@@ -22,7 +22,7 @@ class CycleOfMix(Section):
 
 
 class Legs(Section):
-    """Every load goes linearly from leg to leg; the last legs are one cycle."""
+    """Load path in which every load varies linearly along each leg; the last legs are one cycle."""
 
     increments: Annotated[tuple[Annotated[int, Whole(1, 10_000)], ...] | Auto, OrAuto()] = entry(
         "of each leg; auto: as many as leave no more than wear.tolerance", [8, 14]
@@ -48,10 +48,10 @@ class Legs(Section):
 
     @property
     def legs(self) -> tuple[int, ...]:
-        """Increments of all legs, once they are chosen."""
+        """Increments of all legs, which must be chosen by then."""
         assert isinstance(self.increments, tuple)
         return self.increments
 
     def mixed(self, loads: int) -> list[tuple[tuple[float, ...], float]]:
-        """Factors of all ``loads``, so many, and share of every cycle."""
+        """Return the factors of all ``loads`` and the share of every cycle."""
         return [(cycle.factors, cycle.share) for cycle in self.mix] or [((1.0,) * loads, 1.0)]

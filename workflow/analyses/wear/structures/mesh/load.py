@@ -1,4 +1,4 @@
-"""What every load on the bodies of a user's mesh has in a case."""
+"""Base of all loads on the bodies of a user's mesh."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _directed(components: tuple[float, ...]) -> tuple[float, ...]:
 
 Direction = Annotated[tuple[Component, Component, Component], AfterValidator(_directed)]
 
-# Entries that say where a load acts, and the word before each.
+# Entries for the place of a load, with the preposition of each.
 PLACES = (("group", "on"), ("body", "of"), ("axis", "about"), ("through", "through"), ("at", "at"))
 KINDS = (
     "pressure, force, moment, displacement, remote_displacement, rotation, acceleration, "
@@ -35,16 +35,16 @@ KINDS = (
 
 
 class MeshLoad(Section):
-    """What every load needs."""
+    """Base of all loads."""
 
-    kind: str  # named first; each load narrows it to its own name
+    kind: str  # first in the section; each load narrows it to its own name
     path: tuple[Factor, ...] = entry(
         "factor of the load at the end of each leg of load_path; from 0, linearly [1]", [1.0, 0.0]
     )
 
     @property
     def text(self) -> str:
-        """The load in a line: what, how much, where and in which legs."""
+        """The load in a line: kind, size, place and factors of the legs."""
         kind = self.kind.replace("_", " ")
         sizes = entries(self, ("path", "axis", "through", "at"))
         what = sizes if sizes.startswith(kind) else f"{kind}, {sizes}"
@@ -53,27 +53,27 @@ class MeshLoad(Section):
 
     @property
     def places(self) -> Iterator[str]:
-        """Where it acts."""
+        """Places where the load acts, in words."""
         for name, word in PLACES:
             if getattr(self, name, None) is not None:
                 yield f"{word} {in_brackets(getattr(self, name))}"
 
     @property
     def how(self) -> str:
-        """How it acts there, after a comma."""
+        """How the load acts at its place, after a comma."""
         return ", rigid" if getattr(self, "tie", None) == "rigid" else ""
 
     @property
     def ties(self) -> bool:
-        """Whether it holds nodes, or ties them to each other."""
+        """Whether the load holds nodes, or ties them to each other."""
         return getattr(self, "tie", None) == "rigid"
 
     @property
     def contents(self) -> bytes:
-        """What its files hold: two loads are the same if that is, too."""
+        """Contents of the load's files, by which two loads are compared."""
         return b""
 
 
 def in_brackets(value: str | tuple[float, ...]) -> str:
-    """A name as it is, numbers in brackets."""
+    """Return a name unchanged, numbers in brackets."""
     return value if isinstance(value, str) else f"({', '.join(f'{n:g}' for n in value)})"

@@ -1,4 +1,4 @@
-"""Loads on the bodies of a user's mesh, as a case gives them."""
+"""Loads on the bodies of a user's mesh, as sections of a case."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MomentComponent = Annotated[float, Quantity("N mm", at_least=-1e12, at_most=1e12
 PressureValue = Annotated[float, Quantity("MPa", at_least=-1e5, at_most=1e5)]
 DisplacementComponent = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
 AngularSpeed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
-# Rotations are small: their squares are left out.
+# Rotations are small: their squares are neglected.
 Angle = Annotated[float, Quantity("rad", at_least=-1.0, at_most=1.0)]
 AccelerationComponent = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
 
@@ -53,14 +53,14 @@ class PressureLoad(MeshLoad):
     pressure: PressureValue = entry("into the body [MPa]", "10 MPa")
 
     def described(self) -> fe.Pressure:
-        """As the structure takes it."""
+        """Return the load as the structure takes it."""
         from fe_models.loads.applied_loads import Pressure
 
         return Pressure(self.group, self.pressure)
 
 
 class ForceLoad(MeshLoad):
-    """Force on a boundary: spread evenly, or as a point tied to it hands it on."""
+    """Force on a boundary: spread evenly, or transferred from a point tied to the boundary."""
 
     kind: Literal["force"] = entry(KINDS, "force")
     group: Name = entry("boundary", "blade_top")
@@ -75,7 +75,7 @@ class ForceLoad(MeshLoad):
     tie: Tie = TIE
 
     def described(self) -> fe.BoundaryForce:
-        """As the structure takes it."""
+        """Return the load as the structure takes it."""
         from fe_models.loads.applied_loads import BoundaryForce
 
         at = None if self.at is None else np.array(self.at)
@@ -94,7 +94,7 @@ class MomentLoad(MeshLoad):
     tie: Tie = TIE
 
     def described(self) -> fe.BoundaryForce:
-        """As the structure takes it."""
+        """Return the load as the structure takes it."""
         from fe_models.loads.applied_loads import BoundaryForce
 
         moment = np.array(self.moment)
@@ -102,9 +102,9 @@ class MomentLoad(MeshLoad):
 
 
 class DisplacementLoad(MeshLoad):
-    """Displacement imposed on a boundary along its own direction; free across it.
+    """Displacement of a boundary, imposed along its direction and free across it.
 
-    Several on one boundary add up as vectors: make them perpendicular.
+    Several displacements of one boundary add up as vectors: make them perpendicular.
     """
 
     kind: Literal["displacement"] = entry(KINDS, "displacement")
@@ -124,16 +124,16 @@ class DisplacementLoad(MeshLoad):
         return True
 
     def described(self) -> fe.Displacement:
-        """As the structure takes it."""
+        """Return the load as the structure takes it."""
         from fe_models.loads.applied_loads import Displacement
 
         return Displacement(self.group, np.array(self.displacement))
 
 
 class RemoteDisplacementLoad(MeshLoad):
-    """Displacement and rotation of a point tied to a boundary; small ones.
+    """Small displacement and rotation of a point tied to a boundary.
 
-    Several at one point add up.
+    Several displacements of one point add up.
     """
 
     kind: Literal["remote_displacement"] = entry(KINDS, "remote_displacement")
@@ -178,7 +178,7 @@ class RemoteDisplacementLoad(MeshLoad):
         return free + super().how
 
     def described(self) -> fe.RemoteDisplacement:
-        """As the structure takes it."""
+        """Return the load as the structure takes it."""
         from fe_models.loads.applied_loads import RemoteDisplacement
 
         motion = np.array([*self.displacement, *self.rotation])
@@ -187,7 +187,7 @@ class RemoteDisplacementLoad(MeshLoad):
 
 
 class RotationLoad(MeshLoad):
-    """Rotation of both bodies; its path is that of the speed, whose square the forces follow."""
+    """Rotation of all bodies; the path is that of the speed, and forces follow its square."""
 
     kind: Literal["rotation"] = entry(KINDS, "rotation")
     axis: Direction = entry("direction of the axis [1]", [0.0, 1.0, 0.0])
@@ -197,14 +197,14 @@ class RotationLoad(MeshLoad):
     speed: AngularSpeed = entry("[rad/s]", "6000 rpm")
 
     def described(self) -> fe.Rotation:
-        """As the structure takes it."""
+        """Return the load as the structure takes it."""
         from fe_models.loads.applied_loads import Rotation
 
         return Rotation(np.array(self.axis), np.array(self.through), self.speed)
 
 
 class AccelerationLoad(MeshLoad):
-    """Acceleration of the frame of reference: both bodies are pulled against it."""
+    """Acceleration of the frame of reference, which pulls all bodies in the opposite direction."""
 
     kind: Literal["acceleration"] = entry(KINDS, "acceleration")
     acceleration: tuple[AccelerationComponent, AccelerationComponent, AccelerationComponent] = (
@@ -212,7 +212,7 @@ class AccelerationLoad(MeshLoad):
     )
 
     def described(self) -> fe.Acceleration:
-        """As the structure takes it."""
+        """Return the load as the structure takes it."""
         from fe_models.loads.applied_loads import Acceleration
 
         return Acceleration(np.array(self.acceleration))

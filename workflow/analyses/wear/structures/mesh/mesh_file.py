@@ -1,6 +1,6 @@
-"""The mesh or CAD file of a case, the unit of its lengths, and whether sizes and loads go together.
+"""The mesh or CAD file of a case, its unit of length, and plausibility of sizes and loads.
 
-A mesh in m that is taken as mm is a thousand times too small, and nothing in it says so.
+A mesh in m that is read as mm is a thousand times too small, and nothing in the file shows it.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     from workflow.analyses.wear.structures.mesh.contacts import MeshMaterial
 
 LengthName = Annotated[str, Word(tuple(SIZES))]
-# The longest side of bodies that fret [mm], and the units that files are in, the likeliest first.
+# Usual range of the longest side of bodies in contact [mm], and units of files by likelihood.
 USUAL, UNITS = (0.5, 1e4), ("mm", "m", "um", "in")
-# Faces are hardly moved by more than this share of their body.
+# Largest plausible displacement of a face, relative to its body.
 MOVED = 0.5
 
 
 @dataclass(frozen=True)
 class MeshFile(File):
-    """A file with a mesh or a shape, known by its ending, in capitals or not."""
+    """A file with a mesh or a shape, recognised by its ending in upper or lower case."""
 
     endings: tuple[str, ...] = READ
 
@@ -47,7 +47,7 @@ class MeshFile(File):
 
 
 def lengths_outline(imported: ImportedMesh, names: tuple[str, ...]) -> str:
-    """The unit of lengths, and a box round all bodies of the case."""
+    """Return the unit of length, and the box round all bodies of the case."""
     from fe_models.geometry.imported import extent
 
     points = np.concatenate([imported.bodies[name].mesh.p for name in names], axis=1)
@@ -57,7 +57,7 @@ def lengths_outline(imported: ImportedMesh, names: tuple[str, ...]) -> str:
 def size_doubts(
     imported: ImportedMesh, solids: Mapping[str, MeshMaterial], loads: Sequence[MeshLoad]
 ) -> Iterator[str]:
-    """Doubts about sizes of bodies, which go by name, by themselves and beside loads."""
+    """Yield plausibility warnings about sizes of bodies, by themselves and with the loads."""
     from fe_models.geometry.imported import GIVEN
 
     bodies = [imported.bodies[name] for name in solids]
@@ -73,7 +73,7 @@ def size_doubts(
 
 
 def _unusual(imported: ImportedMesh, side: float) -> str:
-    """A side that is not usual, and a unit in which it would be."""
+    """Return a description of an unusual size, and a unit that would make it usual."""
     least, most = (plain(usual, "mm") for usual in USUAL)
     told = f"bodies of {plain(side, 'mm', 4)}, lengths {imported.unit}; usual: {least} to {most}"
     for name in UNITS:
@@ -86,7 +86,7 @@ def _unusual(imported: ImportedMesh, side: float) -> str:
 def _loads(
     loads: Sequence[MeshLoad], imported: ImportedMesh, solids: Mapping[str, MeshMaterial]
 ) -> Iterator[str]:
-    """Doubts about loads that are too large for the bodies, or all of them too small."""
+    """Yield warnings about loads too large for the bodies, or all of them too small."""
     bodies = [imported.bodies[name] for name in solids]
     stresses: dict[str, float] = {}
     for index, load in enumerate(loads):
@@ -94,7 +94,7 @@ def _loads(
         if isinstance(load, DisplacementLoad):
             yield from _moved(key, load, most, imported, bodies)
         stress = _stress(load, imported, solids)
-        # What is not known is neither large nor small.
+        # An unknown stress counts as neither large nor small.
         stresses[key] = WEAK if stress is None else stress * most
     strongest = max(stresses, key=lambda key: stresses[key])
     moduli = [solid.young for solid in solids.values()]
@@ -105,7 +105,7 @@ def _loads(
 def _moved(
     key: str, load: DisplacementLoad, most: float, imported: ImportedMesh, bodies: list[Body]
 ) -> Iterator[str]:
-    """A doubt about a face that is moved by much of its body."""
+    """Yield a warning about a face whose displacement is large compared with its body."""
     motion = most * float(np.linalg.norm(load.displacement))
     for body in bodies:
         side = float(np.ptp(body.points, axis=0).max())
@@ -119,7 +119,7 @@ def _moved(
 def _stress(
     load: MeshLoad, imported: ImportedMesh, solids: Mapping[str, MeshMaterial]
 ) -> float | None:
-    """About the stress that a load leaves [MPa]; None of loads that say nothing of sizes."""
+    """Return an estimate of the stress due to a load [MPa], None if the load allows none."""
     bodies = [imported.bodies[name] for name in solids]
     if isinstance(load, RotationLoad):
         axis = np.array(load.axis) / np.linalg.norm(load.axis)
@@ -136,13 +136,13 @@ def _stress(
         return None
     if isinstance(load, ForceLoad):
         return float(np.linalg.norm(load.force)) / area
-    # Over a face as wide as long; in the plane over a slice of 1 mm.
+    # The face is taken as square; in the plane it is a slice of 1 mm.
     arm = area if bodies[0].mesh.dim() == 2 else area**0.5
     return float(np.linalg.norm(load.moment)) / (area * arm)
 
 
 def _area(imported: ImportedMesh, body: Body, group: str) -> float:
-    """Area of a boundary, or of a node set that is a face [mm²]; 0 if the body has none."""
+    """Return the area of a boundary or of a node set that is a face [mm²]; 0 if there is none."""
     facets = (body.mesh.boundaries or {}).get(group)
     if facets is None:
         facets = imported.set_faces[body.name].get(group)

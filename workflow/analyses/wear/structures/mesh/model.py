@@ -1,4 +1,4 @@
-"""A mesh case as a model of its structure."""
+"""Translation of a mesh case into a model of its structure."""
 
 from __future__ import annotations
 

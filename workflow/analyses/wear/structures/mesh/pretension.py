@@ -1,4 +1,4 @@
-"""Bolts of a user's mesh that are tightened, as a case gives them."""
+"""Tightened bolts of a user's mesh, as sections of a case."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Shortening = Annotated[float, Quantity("mm", above=0.0, at_most=100.0)]
 
 
 class BoltLoad(MeshLoad):
-    """A bolt that is cut across its shank and shortened there, and then held as long."""
+    """A bolt that is cut across its shank, shortened there, and then held at this length."""
 
     name: Name = entry("of the bolt in all results", "bolt_1")
     body: Name = entry("the bolt, with its head and nut", "blade")
@@ -38,12 +38,12 @@ class BoltLoad(MeshLoad):
 
     @property
     def tension(self) -> float | None:
-        """What the bolt is tightened to [N]; None where its shortening is given."""
+        """Tension to which the bolt is tightened [N]; None if its shortening is given."""
         return None
 
     @property
     def ties(self) -> bool:
-        """It cuts them apart, which is looked at with what ties them."""
+        """True: the cut of a bolt is checked together with ties."""
         return True
 
     @property
@@ -51,7 +51,7 @@ class BoltLoad(MeshLoad):
         yield f"of {self.body}"
 
     def described(self) -> fe.Pretension:
-        """As the structure takes it: shortened by 1 mm where it has its force."""
+        """Return the bolt as the structure takes it: shortened by 1 mm if its force is given."""
         from fe_models.loads.pretension import Pretension
 
         through, axis = np.array(self.through), np.array(self.axis)
@@ -59,7 +59,7 @@ class BoltLoad(MeshLoad):
 
 
 class PretensionLoad(BoltLoad):
-    """A bolt that is tightened to a force in the first leg, and then held as long."""
+    """A bolt that is tightened to a force in the first leg, and then held at its length."""
 
     kind: Literal["pretension"] = entry(KINDS, "pretension")
     force: PressingForce = entry(
@@ -84,14 +84,14 @@ class PretensionLoad(BoltLoad):
 
 
 class ShorteningLoad(BoltLoad):
-    """A bolt that is shortened by a length, whatever force that takes, and held so."""
+    """A bolt that is shortened by a given length, and then held at this length."""
 
     kind: Literal["shortening"] = entry(KINDS, "shortening")
     shortening: Shortening = entry("of the shank [mm]", "20 um")
 
 
 def check_bolts(loads: Sequence[MeshLoad], path: Legs, nonlinearity: Nonlinearity) -> None:
-    """Refuse bolts of one name, tightened in every cycle, or of nonlinear structures."""
+    """Refuse bolts with equal names, bolts tightened in every cycle, and nonlinear structures."""
     bolts = {i: load for i, load in enumerate(loads) if isinstance(load, BoltLoad)}
     names = [bolt.name for bolt in bolts.values()]
     for index, bolt in bolts.items():

@@ -1,4 +1,4 @@
-"""Temperatures of the bodies of a user's mesh, as a case gives them."""
+"""Temperatures of the bodies of a user's mesh, as sections of a case."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from workflow.case.table_file import read_table_file
 if TYPE_CHECKING:
     from fe_models.elasticity import thermal as fe
 
-# Solids expand by less; 12 stands for 12e-6, then.
+# Solids expand by less; the limit catches 12 written for 12e-6.
 Expansion = Annotated[float, Quantity("1/K", at_least=-1e-3, at_most=1e-3)]
 TemperatureValue = Annotated[float, Quantity("K", at_least=-1e4, at_most=1e4)]
-# Columns of a file of temperatures.
+# Columns of a temperature file.
 NODE, TEMPERATURE = "node", "temperature"
 
 
 class _Temperature(MeshLoad):
-    """What every temperature needs."""
+    """Base of all temperature loads."""
 
     body: Name | None = entry("that has it; all bodies if not given", "blade", default=None)
 
 
 class TemperatureLoad(_Temperature):
-    """One change of temperature of all of a body, or of all bodies."""
+    """Uniform change of temperature of a body, or of all bodies."""
 
     kind: Literal["temperature"] = entry(KINDS, "temperature")
     change: TemperatureValue = entry("from the stress-free temperature [K]", "100 K")
 
     def described(self) -> fe.TemperatureChange:
-        """As the structure takes it."""
+        """Return the load as the structure takes it."""
         from fe_models.elasticity.thermal import TemperatureChange
 
         return TemperatureChange(self.change, self.body)
@@ -76,14 +76,14 @@ class NodalTemperatureLoad(_Temperature):
         yield f"of {Path(self.file).name} ({len(values)} nodes, {low:g} to {high:g})"
 
     def described(self) -> fe.NodalTemperature:
-        """As the structure takes it."""
+        """Return the load as the structure takes it."""
         from fe_models.elasticity.thermal import NodalTemperature
 
         numbers, values = self._table()
         return NodalTemperature(numbers, values - self.reference, self.body)
 
     def _table(self) -> tuple[Indices, Array]:
-        """Node numbers and temperatures of the file, ``(n,)`` each. Raises InputFileError."""
+        """Return node numbers and temperatures of the file ``(n,)``. Raises InputFileError."""
         table = read_table_file(self.file)
         table.check({NODE: "1", TEMPERATURE: "K"})
         table.require((NODE, TEMPERATURE), f"{NODE}, {TEMPERATURE}")
@@ -96,10 +96,10 @@ def check_temperatures(
     nonlinearity: Nonlinearity,
     size: float | None,
 ) -> None:
-    """Refuse temperatures of bodies whose expansion is not known, and nonlinear structures.
+    """Refuse temperatures of bodies without expansion, and of nonlinear structures.
 
-    And those of nodes that only this run numbers, as it meshes a shape by elements of a ``size``.
-    ``materials`` are the names of bodies and their expansions by where the case has these.
+    Nodal temperatures are also refused for CAD that is meshed with a ``size``, because its nodes
+    get their numbers in this run. ``materials`` are names and expansions of bodies by case entry.
     """
     heating = [load for load in loads if isinstance(load, _Temperature)]
     for key, (name, expansion) in materials.items():

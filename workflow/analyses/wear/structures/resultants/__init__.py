@@ -1,6 +1,7 @@
-"""Loads of a contact as files: from another FE code in, and worn surfaces back to its nodes.
+"""Loads of a contact from files of another FE code, and worn surfaces back to its nodes.
 
-Columns, units, signs and how to get them out of Abaqus and Ansys: ``RECIPE.md`` beside this file.
+``RECIPE.md`` in this folder explains columns, units and signs, and how to export them from Abaqus
+and Ansys.
 """
 
 from __future__ import annotations

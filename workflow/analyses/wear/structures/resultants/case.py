@@ -1,4 +1,4 @@
-"""A case whose loads come from a file: another code's finite elements, our contact and wear."""
+"""A case whose loads come from a file of another finite element code."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from workflow.case.input_files import InputFileError
 from workflow.case.plain import between, plain, shape_in_words
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
-# How far x and normal may be from perpendicular: six printed digits.
+# Deviation of x and normal from a right angle that is accepted, for numbers with six digits.
 PERPENDICULAR = 1e-6
-# Tangential forces below this share of the normal one are rounding.
+# Tangential forces below this share of the normal force are rounding.
 NOTHING = 1e-9
 
 Place = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
@@ -38,7 +38,7 @@ NodeFile = Annotated[str, File((".csv",))]
 
 
 class FaceFrame(Section):
-    """Where a face lies in the user's axes; y is normal × x."""
+    """Position of a face in the user's axes; y is normal × x."""
 
     origin: tuple[Place, Place, Place] = entry(
         "centre of the face [mm]", ["15 mm", "0 mm", "245 mm"]
@@ -64,7 +64,7 @@ class FaceFrame(Section):
         return self
 
     def frame(self) -> Frame:
-        """The frame, its axes of length 1."""
+        """Return the frame, with axes of length 1."""
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         x = np.array(self.x) - (np.array(self.x) @ normal) * normal
         x /= np.linalg.norm(x)
@@ -72,14 +72,14 @@ class FaceFrame(Section):
 
 
 class NodeTables(Section):
-    """Node numbers and global coordinates of the face of each body, to take the worn surface."""
+    """Node numbers and global coordinates of each body's face, for the worn surfaces."""
 
     body_1: NodeFile | None = entry("columns node, X, Y, Z", "nodes_1.csv", default=None)
     body_2: NodeFile | None = entry("columns node, X, Y, Z", "nodes_2.csv", default=None)
 
 
 class ImportedInterface(Section):
-    """An interface of the file, and what is different or known about it."""
+    """An interface of the file, with its own settings."""
 
     name: Title = entry("as in the file; 'interface' where it has no names", "interface")
     size: Sizes | None = entry("instead of structure.size [mm]", ["11 mm", "60 mm"], default=None)
@@ -135,52 +135,53 @@ class Resultants(Section):
         return self.dimension == 2
 
     def size_of(self, name: str) -> tuple[float, float]:
-        """Extent of a face along x and y [mm]; of a line contact a slice of 1 mm."""
+        """Return the extent of a face along x and y [mm]; a line contact is 1 mm long."""
         size = self._interface(name).size or self.size
         return size[0], 1.0 if self.line else size[1]
 
     def gap_of(self, name: str) -> GapShape | None:
-        """Gap over a face, None where the file has it."""
+        """Return the gap over a face, or None if it comes from the file."""
         return self._interface(name).gap or self.gap
 
     def surfaces_of(self, name: str) -> MeasuredSurfaces | None:
-        """Measured surfaces of a face."""
+        """Return the measured surfaces of a face, or None."""
         return self._interface(name).surfaces or self.surfaces
 
     def frame_of(self, name: str) -> Frame | None:
-        """Frame of a face where the case gives one."""
+        """Return the frame of a face, or None if the case gives none."""
         frame = self._interface(name).frame
         return None if frame is None else frame.frame()
 
     def nodes_of(self, name: str) -> dict[Literal[1, 2], str]:
-        """Node tables of a face by body."""
+        """Return the node tables of a face by body."""
         nodes = self._interface(name).nodes or NodeTables()
         files: dict[Literal[1, 2], str | None] = {1: nodes.body_1, 2: nodes.body_2}
         return {body: file for body, file in files.items() if file is not None}
 
     def _interface(self, name: str) -> ImportedInterface:
-        """What the case gives about an interface: nothing, unless it names that."""
+        """Return the settings of an interface; empty ones unless the case names it."""
         named = {interface.name: interface for interface in self.interfaces}
         return named.get(name) or ImportedInterface(name=name)
 
     def key_of(self, name: str, key: str) -> str:
-        """The dotted path of an entry about a face: of the interface where that has it."""
+        """Return the dotted path of a face's entry, that of its interface if it is given there."""
         for number, interface in enumerate(self.interfaces):
             if interface.name == name and getattr(interface, key.partition(".")[0]) is not None:
                 return f"structure.interfaces.{number}.{key}"
         return f"structure.{key}"
 
     def read(self, friction: float) -> dict[str, ImportedLoads]:
-        """Loads of all interfaces of the file, by name. Raises InputFileError."""
+        """Return the loads of all interfaces of the file, by name. Raises InputFileError."""
         from workflow.analyses.wear.structures.resultants.reading import read_resultants
 
-        # The faces' sizes bound the moments, and the first reading says which faces there are.
+        # The faces' sizes bound the moments, so the first reading only finds out which faces there
+        # are.
         names = read_resultants(self.file, self.line)
         sizes = {name: self.size_of(name) for name in names}
         return read_resultants(self.file, self.line, friction, sizes)
 
     def taken(self, loads: dict[str, ImportedLoads]) -> dict[str, ImportedLoads]:
-        """Of what the file has, the interfaces that the case takes."""
+        """Return those of the loads in the file that the case uses."""
         names = [interface.name for interface in self.interfaces] or list(loads)
         return {name: loads[name] for name in names}
 
@@ -216,7 +217,7 @@ class ResultantsCase(WearCase):
     wear: Wear = entry("law, length of the run and step")
 
     def loads(self) -> dict[str, ImportedLoads]:
-        """Loads of the interfaces that are taken, by name. Raises InputFileError."""
+        """Return the loads of the interfaces in use, by name. Raises InputFileError."""
         return self.structure.taken(self.structure.read(self.friction.at(0.0)))
 
     @property
@@ -254,7 +255,7 @@ class ResultantsCase(WearCase):
             yield from self._scanned(name)
 
     def _scanned(self, name: str) -> Iterator[ScannedFace]:
-        """The face of that name, if it has surfaces as measured."""
+        """Yield the face of that name, if it has measured surfaces."""
         structure = self.structure
         surfaces = structure.surfaces_of(name)
         if surfaces is not None:
@@ -298,7 +299,7 @@ class ResultantsCase(WearCase):
         return self
 
     def _check_names(self, in_file: list[str]) -> None:
-        """Every interface of the case is in the file, once, and none is called as a result is."""
+        """Refuse interfaces that are not in the file, given twice, or named as a result is."""
         named = [interface.name for interface in self.structure.interfaces]
         for number, name in enumerate(named):
             key = f"structure.interfaces.{number}.name"
@@ -354,7 +355,7 @@ class ResultantsCase(WearCase):
 
 
 def _ranges(loads: LoadHistory, unit: str) -> str:
-    """What P, and Qx and Qy where they act, reach in a cycle."""
+    """Return the ranges of P, and of Qx and Qy if they act, in a cycle, in words."""
     low, high = float(loads.P.min()), float(loads.P.max())
     told = [f"P {between(low, high, unit) if low else f'up to {plain(high, unit)}'}"]
     if low == high:

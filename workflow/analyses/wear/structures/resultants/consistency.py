@@ -1,4 +1,4 @@
-"""What the loads of an interface must satisfy whatever code they come from."""
+"""Consistency checks of the loads of an interface, whatever code they come from."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from workflow.analyses.wear.case.sections import SHARES_APART
 from workflow.analyses.wear.structures.resultants.imported import COLUMNS
 from workflow.case.input_files import InputFileError
 
-# Below this share of a column's largest value numbers are what an iterative solver leaves.
+# Numbers below this share of a column's largest value are remainders of an iterative solver.
 REMAINDER = 1e-6
-# Forces may pass what the face can carry by this share: friction regularised by a penalty, and
-# results printed with four digits.
+# Relative excess of forces over what the face can carry that is accepted: penalty friction and
+# results with four digits cause it.
 EXCESS = 1e-3
 
 Refusal = Callable[[int, str, str, str], InputFileError]
-"""The error about a column of an increment: what is wrong, what is allowed."""
+"""Return the error for a column of an increment, from what is wrong and what is allowed."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What is known of an interface: Coulomb's coefficient, and the ``size`` of its face [mm]."""
+    """Known bounds of an interface: Coulomb's coefficient and the ``size`` of its face [mm]."""
 
     friction: float | None = None
     size: tuple[float, float] | None = None
@@ -40,9 +40,9 @@ def checked_loads(
     bounds: Bounds,
     refusal: Refusal,
 ) -> LoadHistory:
-    """The loads of ``columns``, where the file marks what is ``sliding`` or not, and of its mix.
+    """Return the loads of ``columns``, with marks of ``sliding`` increments and a mix if given.
 
-    Raises what ``refusal`` makes of the first column ``(n,)`` that contradicts another.
+    Raises the error of ``refusal`` for the first column ``(n,)`` that contradicts another.
     """
     _check_columns(columns, bounds, refusal)
     if sliding is None:
@@ -66,9 +66,10 @@ def _check_columns(columns: dict[str, Array], bounds: Bounds, refusal: Refusal) 
 
 
 def _slides_by_limit(columns: dict[str, Array], friction: float | None) -> Mask:
-    """Increments ``(n,)`` that slide as a whole: near Coulomb's limit, with energy lost.
+    """Return the mask ``(n,)`` of increments that slide as a whole and lose energy.
 
-    None of them where friction is not known. The contact solver decides by the same share.
+    These are near Coulomb's limit, by the share that the contact solver uses as well. Without a
+    known friction there are none.
     """
     P = columns["P"]
     if friction is None:
@@ -83,10 +84,10 @@ MIX = ("block", "share")
 
 
 def _mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, Any]:
-    """``block`` counted from 0 and ``share`` ``(n,)`` of a mix, from what a file calls them.
+    """Return ``block`` counted from 0 and ``share`` ``(n,)`` of a mix, from the file's columns.
 
-    Empty where the file has neither. Raises what ``refusal`` makes of columns that are no mix: the
-    rows of a block follow each other and have one share, and the shares add up to 1.
+    The result is empty if the file has neither. Raises the error of ``refusal`` unless the rows of
+    a block are consecutive and have one share, and the shares add up to 1.
     """
     present = [name for name in MIX if name in columns]
     if not present:
@@ -114,7 +115,7 @@ def _refuse_where(wrong: Mask, column: str, what: str, allowed: str, refusal: Re
 
 
 def _check_apart(columns: dict[str, Array], remainder: dict[str, float], refusal: Refusal) -> None:
-    """Bodies that are apart carry and dissipate nothing."""
+    """Refuse forces, moments and energies where the bodies are apart."""
     apart = columns["P"] == 0.0
     for name in COLUMNS[1:]:
         allowed = "0 where the bodies are apart"
@@ -125,7 +126,7 @@ def _check_apart(columns: dict[str, Array], remainder: dict[str, float], refusal
 
 
 def _check_line(columns: dict[str, Array], refusal: Refusal) -> None:
-    """Moments of a line contact about other axes than its length have no lever arm."""
+    """Refuse moments of a line contact about other axes than its length: they have no lever arm."""
     for name in ("Mx", "Mz"):
         wrong = np.abs(columns[name]) > REMAINDER * columns["P"].max()
         _refuse_where(wrong, name, "moment of a line contact", "0 but for My", refusal)
@@ -147,7 +148,7 @@ def _check_friction(columns: dict[str, Array], friction: float, refusal: Refusal
 
 
 def _check_moments(columns: dict[str, Array], bounds: Bounds, refusal: Refusal) -> None:
-    """The centre of pressure lies on the face, and so does all shear."""
+    """Refuse moments that put the centre of pressure or the shear outside the face."""
     assert bounds.size is not None
     half_x, half_y = 0.5 * bounds.size[0], 0.5 * bounds.size[1]
     arms = {"My": half_x} if bounds.line else {"Mx": half_y, "My": half_x}

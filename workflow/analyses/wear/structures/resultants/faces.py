@@ -1,4 +1,4 @@
-"""Facets over the nodes of a contact face, where the file gives none."""
+"""Facets over the nodes of a contact face, for files that give none."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from sa_solver.types import Array, Indices
 
-# Triangles flatter than this are slivers along a straight edge of the face, left by coordinates
-# that are printed with six digits; elements of a contact face are never as thin.
+# Triangles flatter than this are slivers along a straight edge of the face, due to coordinates with
+# six digits; elements of a contact face are never as thin.
 FLATTEST = 1e-4
 
 
 class FaceError(ValueError):
-    """The nodes make no face."""
+    """Error of nodes that do not form a face."""
 
 
 def facets_over(coordinates: Array, line: bool) -> Indices:
-    """Triangles ``(m, 3)`` over nodes ``(n, 2)`` [mm], segments ``(n - 1, 2)`` in a line contact.
+    """Return triangles ``(m, 3)`` over nodes ``(n, 2)`` [mm]; segments ``(n - 1, 2)`` in a line.
 
     Triangles are Delaunay's and fill the convex hull of the nodes: the facets of a face with holes
     or notches must be given. Raises FaceError if a node belongs to none.

@@ -31,17 +31,17 @@ from workflow.shell.dataset import unit_in
 from workflow.shell.results import frame_of
 
 LOADS = "load_history"
-# In a group beside the loads: what is read, and what our results hold besides.
+# Datasets in a group in addition to the loads: those that are read, and others of our results.
 ON_NODES = ("facets", "slip", "force", "displacement", "nodes_1", "nodes_2", "nodal_height")
 NODAL = ("coordinates", *ON_NODES, "height")
 IGNORED = ("pressure", "shear")
-# How far nodal forces may be from adding up to those of the loads, in shares of the largest P.
+# Accepted error of the sum of nodal forces, relative to the largest P.
 ADD_UP = 0.01
 
 
 @dataclass(frozen=True)
 class Group:
-    """A group of an open file, which says where it is when something in it is wrong."""
+    """A group of an open file, whose errors name the place in the file."""
 
     file: str
     group: h5py.Group
@@ -51,7 +51,7 @@ class Group:
         return InputFileError(f"{self.file}: {place}: {wrong}; allowed: {allowed}")
 
     def numbers(self, name: str, unit: str = "1") -> Array | None:
-        """A dataset in the base unit ``unit``, None if there is none. Raises InputFileError."""
+        """Return a dataset in the base unit ``unit``, None if missing. Raises InputFileError."""
         if name not in self.group:
             return None
         dataset = self.group[name]
@@ -70,7 +70,7 @@ class Group:
         return numbers if factor == 1.0 else numbers * factor
 
     def whole(self, name: str) -> Indices | None:
-        """A dataset of whole numbers, None if there is none. Raises InputFileError."""
+        """Return a dataset of whole numbers, None if missing. Raises InputFileError."""
         numbers = self.numbers(name)
         if numbers is None:
             return None
@@ -79,7 +79,7 @@ class Group:
         return numbers.astype(np.int64)
 
     def shaped(self, name: str, unit: str, shape: tuple[int, ...]) -> Array | None:
-        """As ``numbers``, of a given shape."""
+        """Return :meth:`numbers` of a dataset with the given shape."""
         numbers = self.numbers(name, unit)
         if numbers is not None and numbers.shape != shape:
             raise self.error(name, f"shape {numbers.shape}", f"{shape}")
@@ -89,7 +89,7 @@ class Group:
 def read_h5(
     file: str, group: str, bounds: Callable[[str], Bounds], line: bool
 ) -> dict[str, ImportedLoads]:
-    """Loads by interface of the group ``group``, which holds a group for each.
+    """Return the loads by interface from the groups in ``group``.
 
     Raises InputFileError.
     """
@@ -192,7 +192,7 @@ def _loads(group: Group, bounds: Bounds) -> LoadHistory:
 def _solution(
     group: Group, loads: LoadHistory, count: int, line: bool
 ) -> tuple[Array | None, Array | None]:
-    """Nodal forces and displacements ``(t, 3, n)``, both or neither."""
+    """Return nodal forces and displacements ``(t, 3, n)``, both or neither."""
     shape, unit = (len(loads), 3, count), unit_in(line, "N")
     force = group.shaped("force", unit, shape)
     displacement = group.shaped("displacement", "mm", shape)
@@ -211,7 +211,7 @@ def _solution(
 
 
 def _closure(group: Group) -> float | None:
-    """How well the cycle is closed, None where the file does not say."""
+    """Return how well the cycle is closed, or None if the file does not give it."""
     written = group.group.attrs.get(CLOSURE)
     if written is None:
         return None

@@ -1,4 +1,4 @@
-"""Loads of one interface that came from a file, and the columns such files have."""
+"""Loads of one interface from a file, and the columns of such files."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from workflow.shell.dataset import unit_in
 
 COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
 MOMENTS = ("Mx", "My")
-# A line contact has none of these unless it is sheared along its length.
+# Columns that a line contact has only if it is sheared along its length.
 OPTIONAL_IN_LINE = ("Qy", "Mx", "Mz", "Edy")
-# How well the cycle repeats the one before it, relative; all rows of an interface have the same.
+# Relative change of the contact forces from the cycle before, equal in all rows of an interface.
 CLOSURE = "closure"
-# Name of the interface of a file that names none.
+# Name of the interface in a file without names.
 UNNAMED = "interface"
 
 
 @dataclass(frozen=True)
 class ImportedLoads:
-    """What a file says of one interface.
+    """Data of one interface from a file.
 
-    ``loads`` are those of one closed cycle; without moments the ``tilt`` is held. ``closure`` is by
-    how much that changed the contact forces of the cycle before it, over the largest. With the
-    nodes of the face: ``slip`` ``(t, 2, n)`` of each increment [mm], at its end ``force``
+    ``loads`` are those of one closed cycle; without moments the ``tilt`` is held. ``closure`` is
+    the change of the contact forces from the cycle before, over the largest force. With the nodes
+    of the face there may be: ``slip`` ``(t, 2, n)`` of each increment [mm]; at its end ``force``
     ``(t, 3, n)`` on body 2 [N] and ``displacement`` ``(t, 3, n)`` [mm] relative to body 1, both or
-    neither, ``coordinates`` ``(n, 2)`` in the interface frame [mm], ``facets`` ``(m, 3)`` or, in a
-    line contact, ``(m, 2)``, the ``frame`` in the user's axes, the user's node numbers on body 1
-    and body 2 ``(n,)``, and the gap of the unloaded, unworn faces [mm]: ``nodal_height`` ``(n,)``
-    at these nodes, ``height`` ``(nx, ny)`` on the grid of the case. None where not given.
-    ``weighted`` tells how force and displacement are those of nodes
+    neither; ``coordinates`` ``(n, 2)`` in the interface frame [mm]; ``facets`` ``(m, 3)`` or, in a
+    line contact, ``(m, 2)``; the ``frame`` in the user's axes; the user's node numbers on body 1
+    and body 2 ``(n,)``; and the gap of the unloaded, unworn faces [mm], ``nodal_height`` ``(n,)``
+    at these nodes and ``height`` ``(nx, ny)`` on the grid of the case. Each is None if it is not
+    given. ``weighted`` says how force and displacement are defined at nodes
     (:class:`fe_models.meshes.structure_mesh.Face`).
     """
 
@@ -54,9 +54,9 @@ class ImportedLoads:
     weighted: bool = False
 
     def face(self, name: str) -> Face | None:
-        """The face that slip is given on, None where there is none.
+        """Return the face on which slip is given, or None if there is none.
 
-        In the global axes where the file does not say where it lies.
+        It is in the global axes if the file does not give a frame.
         """
         if self.coordinates is None or self.facets is None:
             return None
@@ -65,18 +65,18 @@ class ImportedLoads:
 
 
 def base_units(line: bool) -> dict[str, str]:
-    """Base unit of every column; per length in a line contact."""
+    """Return the base unit of every column; per length in a line contact."""
     return {name: unit_in(line, unit) for name, (unit, _) in LOADS.items() if name != "sliding"}
 
 
 def required_columns(line: bool, given: Collection[str]) -> list[str]:
-    """Columns that a file with those ``given`` must have: both moments of the pressure, or none."""
+    """Return the columns required in a file with those ``given``; it needs both moments or none."""
     moments = MOMENTS if tilt_of(line, given) == "held" else ()
     optional = (*(OPTIONAL_IN_LINE if line else ()), *moments)
     return [name for name in COLUMNS if name not in optional]
 
 
 def tilt_of(line: bool, given: Collection[str]) -> Tilt:
-    """What a file with these columns leaves to the contact: without moments the tilt is held."""
+    """Return the tilt for a file with these columns: held without moments of the pressure."""
     moments = MOMENTS[1:] if line else MOMENTS
     return "free" if any(name in given for name in moments) else "held"

@@ -1,4 +1,4 @@
-"""Loads of the interfaces of a structure, from a CSV or an HDF5 file."""
+"""Reading of the loads of a structure's interfaces from a CSV or an HDF5 file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from workflow.case.input_files import InputFileError
 from workflow.case.table_file import TableFile, read_table_file
 
 INTERFACE, INCREMENT, SLIDING = "interface", "increment", "sliding"
-# Names become groups of results and columns of tables.
+# Allowed names: they become groups of results and columns of tables.
 NAME = re.compile(r"\w[\w .-]*")
 HDF5 = (".h5", ".hdf5")
 
@@ -40,12 +40,12 @@ def read_resultants(
     friction: float | None = None,
     face_sizes: Mapping[str, tuple[float, float]] | None = None,
 ) -> dict[str, ImportedLoads]:
-    """Loads by interface, in base units; per mm in a ``line`` contact.
+    """Return the loads by interface, in base units; per mm in a ``line`` contact.
 
-    A ``.h5`` file may name the group to look into: ``results.h5:structure``. ``friction`` µ and the
-    ``face_sizes`` (x, y) [mm] by interface, where given, bound forces and moments. Increments that
-    slide are those that the file marks or, where it marks none, those within 1 % of Coulomb's
-    limit that dissipate.
+    The path of an ``.h5`` file may include the group to read: ``results.h5:structure``.
+    ``friction`` µ and the ``face_sizes`` (x, y) [mm] by interface, where given, bound forces and
+    moments. Sliding increments are those that the file marks or, without marks, those within 1 % of
+    Coulomb's limit that dissipate.
 
     Raises InputFileError, ``file:line: column: what is wrong; allowed: ...``.
     """
@@ -85,7 +85,7 @@ def read_resultants(
 
 
 def _alike(file: str, read: dict[str, ImportedLoads]) -> dict[str, ImportedLoads]:
-    """What was read, if all interfaces go through the same mix of cycles."""
+    """Return the loads if all interfaces have the same mix of cycles; refuse others."""
     first, *others = read
     expected = read[first].loads
     for name in others:
@@ -101,13 +101,13 @@ def _alike(file: str, read: dict[str, ImportedLoads]) -> dict[str, ImportedLoads
 
 
 def _columns(line: bool) -> dict[str, str | None]:
-    """Base units of all columns of a CSV file; None is text."""
+    """Return the base units of all columns of a CSV file; None stands for text."""
     bare = dict.fromkeys((SLIDING, *MIX, CLOSURE), "1")
     return {INTERFACE: None, INCREMENT: "1", **base_units(line), **bare}
 
 
 def _rows_of(table: TableFile) -> dict[str, list[int]]:
-    """Rows of every interface, in the order of its increments."""
+    """Return the rows of every interface, in the order of its increments."""
     named = INTERFACE in table.names
     names = table.cells(INTERFACE) if named else [UNNAMED] * len(table)
     rows: dict[str, list[int]] = {}

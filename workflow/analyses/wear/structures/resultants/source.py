@@ -38,7 +38,7 @@ class ResultantsSource(UncoupledSource):
 
     @cached_property
     def imported(self) -> dict[str, ImportedLoads]:
-        """What the file says, by interface."""
+        """Data of the file by interface."""
         return self._case.loads()
 
     @cached_property
@@ -47,12 +47,12 @@ class ResultantsSource(UncoupledSource):
 
     @cached_property
     def peak(self) -> int:  # type: ignore[override]
-        """First increment in which a face carries the largest P of all."""
+        """First increment in which a face carries the largest P of all faces."""
         heaviest = np.max([imported.loads.P for imported in self.imported.values()], axis=0)
         return first_largest(heaviest)
 
     def frame(self, name: str) -> Frame | None:
-        """Where a face lies in the user's axes, None where nobody says."""
+        """Return the frame of a face in the user's axes, or None if it is unknown."""
         return self._case.structure.frame_of(name) or self.imported[name].frame
 
     def unworn(self) -> tuple[CycleLoads, ...]:
@@ -67,7 +67,7 @@ class ResultantsSource(UncoupledSource):
         )
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
-        """Over the nodes of the case's tables, else over those of the file of loads."""
+        """Return the user's nodes from the case's tables, or else from the file of loads."""
         name, imported = list(self.imported.items())[number]
         frame, tables = self.frame(name), self._case.structure.nodes_of(name)
         if frame is None:
@@ -93,14 +93,14 @@ class ResultantsSource(UncoupledSource):
         )
 
     def _face(self, name: str, imported: ImportedLoads, size: tuple[float, float]) -> Face:
-        """The face of the file, or the corners of the nominal one."""
+        """Return the face of the file, or the corners of the nominal one."""
         frame, face = self.frame(name), imported.face(name)
         if face is None:
             return nominal_face(name, size, self.line, frame)
         return replace(face, frame=frame or face.frame)
 
     def _coarse(self, imported: ImportedLoads, grid: Grid) -> tuple[int, int]:
-        """About as many square-ish cells as the face has nodes; without nodes larger cells."""
+        """Return about as many squarish cells as the face has nodes; larger ones without nodes."""
         if imported.coordinates is None:
             coarse = grid.shape[0] / COARSER, grid.shape[1] / COARSER
         elif self.line:
@@ -112,5 +112,5 @@ class ResultantsSource(UncoupledSource):
 
 
 def _slip(imported: ImportedLoads, nodes: int) -> Array:
-    """Slip of the file, or none."""
+    """Return the slip of the file, or zeros."""
     return np.zeros((len(imported.loads), 2, nodes)) if imported.slip is None else imported.slip

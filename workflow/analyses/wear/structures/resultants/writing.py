@@ -1,4 +1,4 @@
-"""Loads of our structures as files, in the form in which they are read."""
+"""Files with the loads of a structure, in the form in which they are read."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOTE = "forces and moments of body 1 on body 2, in the frame of each interface"
 
 
 def marched(cycle: CycleSolution) -> str:
-    """Which cycle the loads are, and how well it is closed."""
+    """Return a note on which cycle the loads are, and how well it is closed."""
     return (
         f"the last of {cycle.cycles} cycles marched from rest, which changes the contact forces "
         f"of the one before it by {cycle.closure:.1e} of the largest"
@@ -37,9 +37,9 @@ def write_resultants_csv(
     line: bool = False,
     cycle: CycleSolution | None = None,
 ) -> None:
-    """Write the loads of every interface; numbers read back are the same, bit for bit.
+    """Write the loads of every interface, with all digits of the numbers.
 
-    Loads of a ``line`` contact are per mm. They are those of a ``cycle``, where one was marched.
+    Loads of a ``line`` contact are per mm. ``cycle`` is the solution that they come from, if any.
     """
     loads = list(histories.values())
     units = base_units(line) | {"sliding": ""}
@@ -64,10 +64,10 @@ def write_resultants_h5(
     heights: Mapping[str, Array] | None = None,
     cycle: CycleSolution | None = None,
 ) -> None:
-    """Write what every interface carries, with its face, frame and node numbers.
+    """Write the loads and nodal fields of every interface, with its face, frame and node numbers.
 
-    ``heights`` ``(nx, ny)`` [mm] are the unworn gaps on the grid of the case, by interface. Loads
-    are those of a ``cycle``, where one was marched.
+    ``heights`` ``(nx, ny)`` [mm] are the unworn gaps on the grid of the case, by interface.
+    ``cycle`` is the solution that the loads come from, if any.
     """
     line = any(history.interface.line for history in histories.values())
     with writing(path, line) as writer:
@@ -87,12 +87,12 @@ def write_resultants_h5(
 
 
 def put_closure(writer: ResultsWriter, group: str, cycle: CycleSolution) -> None:
-    """Which of how many cycles marched the loads of an interface are, as they are read back."""
+    """Write the number of marched cycles and the closure of the last one, to be read back."""
     writer.put(group, {}, cycles=cycle.cycles, **{CLOSURE: cycle.closure})
 
 
 def _at_nodes(face: Interface) -> dict[str, Dataset]:
-    """Gap and node numbers at the nodes of the face; body 1's where both meet node to node."""
+    """Return gap and node numbers at the face's nodes; those of body 1 only if meshes match."""
     datasets = {
         "nodes_1": Dataset(face.nodes_1, "1", "node numbers of body 1"),
         "nodes_2": Dataset(face.nodes_2, "1", "node numbers of body 2"),
