@@ -34,13 +34,13 @@ class TractionState(StickingState):
 
     @property
     def pressure(self) -> Array:
-        """p ``(nx, ny)`` [MPa]."""
+        """Pressure p ``(nx, ny)`` [MPa]."""
         pressure: Array = self.traction[2]
         return pressure
 
     @property
     def shear(self) -> Array:
-        """qx, qy ``(2, nx, ny)`` [MPa]."""
+        """Shear tractions qx, qy ``(2, nx, ny)`` [MPa]."""
         return self.traction[:2]
 
     @property

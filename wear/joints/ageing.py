@@ -387,7 +387,6 @@ def steady_stroke(law: UniaxialLaw, evolution: JointEvolution, amplitude: float)
     >>> print(f"{long_test(steady, cycles=1e6).final_energy:.0f} N mm")
     1000000 N mm
     """
-
     amplitude = checks.number("amplitude", amplitude, least=0.0)
 
     def energy_per_cycle(energy: float) -> float:

@@ -1,16 +1,15 @@
-"""Bouc and Wen's joint for many increments at once: all branches are pieces of one curve.
+"""Bouc-Wen joints for many increments at once: all branches are pieces of one curve.
 
-The rate dη/ds = r(η) of :mod:`wear.joints.bouc_wen` depends on neither s nor the stiffness or the
-limit of the joint. Its solution that begins at η = -1, full sliding the other way, rises through
-η = 0 to full sliding, and r > 0 in between. So for an exponent n and a σ there is one curve η(s),
-and every increment of every joint is a piece of it,
+The rate dη/ds = r(η) of :mod:`wear.joints.bouc_wen` depends neither on s nor on the stiffness or
+the limit of the joint. The solution that begins at η = -1 (full sliding in the opposite direction)
+rises through η = 0 to full sliding, with r > 0 in between. For each exponent n and each σ there is
+therefore one curve η(s), and every increment of every joint is a piece of it,
 
     η(s₀ + s),   s₀ = s(η₀),   with the loss w(s₀ + s) - w(s₀).
 
-The curve is marched once, by the rule and in the steps of a single joint, and kept. An increment
-then costs a step of the rule from the point of the curve before its end, and some for s₀: none of
-it depends on how long the increment is. Results are within the error of the rule of those that
-are marched alone, whose steps begin elsewhere.
+The curve is integrated once, by the Runge-Kutta steps of a single joint, and stored. An increment
+then costs one such step for its end and a few for s₀, however long it is. The result agrees with
+that of a joint integrated alone to the error of the method.
 """
 
 from __future__ import annotations
@@ -37,11 +36,11 @@ from wear.joints.law import JointResponse, JointState
 from wear.joints.parameters import require
 
 CURVES = 8
-"""Curves that are kept: a fit comes back to that of its last values, with two slightly changed."""
+"""Number of curves that are stored. A fit needs that of its last values and two nearby ones."""
 
 NEWTON_STEPS = 3
-"""Newton's steps for s(η) within a step of the rule, over which r changes by about 2 %: the first
-is 1 % off, the second 1e-6 and the third 1e-14."""
+"""Newton steps for s(η) within one step of the curve, over which r changes by about 2 %. The error
+is 1 % after the first, 1e-6 after the second and 1e-14 after the third."""
 
 CLOSED = (1.0, 2.0)
 """Exponents with solutions in closed form, which need no curve."""
@@ -49,7 +48,7 @@ CLOSED = (1.0, 2.0)
 
 @compiled()
 def _march(exponent: float, gain: float) -> Array:
-    """s, η and the loss ``(3, k)`` from η = -1 to full sliding."""
+    """Return s, η and the loss ``(3, k)`` along the curve, from η = -1 to full sliding."""
     s, eta, lost = 0.0, -1.0, 0.0
     points = [(s, eta, lost)]
     while eta < SATURATED:
@@ -75,7 +74,7 @@ def bouc_wen_curve(exponent: float, gain: float) -> Array:
 
 @compiled()
 def _place(curve: Array, eta: float, exponent: float, gain: float) -> tuple[float, float]:
-    """s and the loss where the curve is at η."""
+    """Return s and the loss at the point of the curve with the given η."""
     eta = min(eta, SATURATED)
     k = max(int(np.searchsorted(curve[1], eta, "right")) - 1, 0)
     begin = curve[1, k]
@@ -89,7 +88,7 @@ def _place(curve: Array, eta: float, exponent: float, gain: float) -> tuple[floa
 
 @compiled()
 def _point(curve: Array, s: float, exponent: float, gain: float) -> tuple[float, float]:
-    """η and the loss where the curve is at s."""
+    """Return η and the loss at the point of the curve with the given s."""
     k = int(np.searchsorted(curve[0], s, "right")) - 1
     step = s - curve[0, k]
     if k == curve.shape[1] - 1:
@@ -102,12 +101,12 @@ def _point(curve: Array, s: float, exponent: float, gain: float) -> tuple[float,
 def _advance(
     curve: Array, joint: Array, displacement: float, xi: float, increment: float
 ) -> tuple[float, float, float, float, float]:
-    """As :func:`wear.joints.bouc_wen.advance_bouc_wen`, along the curve."""
+    """Return the same as :func:`wear.joints.bouc_wen.advance_bouc_wen`, from the curve."""
     stiffness, residual, limit = joint[0], joint[1], joint[2]
     exponent, gain = joint[3], joint[4]
     way = (stiffness - residual) * abs(increment)
     if way == 0.0 or limit <= NO_FRICTION * way:
-        # Nothing is marched where nothing moves or holds.
+        # Nothing is integrated where the joint does not move or carries no friction.
         return advance_bouc_wen(
             stiffness, residual, limit, exponent, gain, displacement, xi, increment
         )
