@@ -1,4 +1,4 @@
-"""What states of contacts with friction say of their cells: areas, and the energy stored."""
+"""Base classes of contact states: areas of contact and stick, and elastic energy."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from sa_solver.types import Array, Mask
 
 
 class StickingState:
-    """State of a contact on a grid, with its ``sticking`` cells ``(nx, ny)``.
+    """State of a contact on a grid whose ``sticking`` cells ``(nx, ny)`` are known.
 
-    ``cell_area`` [mm²] is that of the grid.
+    ``cell_area`` [mm²] is the area of a cell.
     """
 
     sticking: Mask
@@ -18,12 +18,12 @@ class StickingState:
 
     @property
     def stick_area(self) -> float:
-        """Area of the cells that stick [mm²; in a line contact, per mm, their width in mm]."""
+        """Area of the cells that stick [mm²]; for a line contact their width [mm]."""
         return float(np.count_nonzero(self.sticking)) * self.cell_area
 
 
 class TractionState(StickingState):
-    """Such a state with pressure and shear together.
+    """State of a contact with pressure and shear.
 
     ``traction`` ``(3, nx, ny)`` is ordered qx, qy, p [MPa], ``displacement`` its K t
     ``(3, nx, ny)`` [mm].
@@ -45,15 +45,15 @@ class TractionState(StickingState):
 
     @property
     def contact_area(self) -> float:
-        """Area of the cells in contact [mm²; in a line contact, per mm, its width in mm]."""
+        """Area of the cells in contact [mm²]; for a line contact its width [mm]."""
         return float(np.count_nonzero(self.pressure)) * self.cell_area
 
     @property
     def elastic_energy(self) -> float:
-        """Energy ½ Σ t·u S that all tractions store in both bodies [N mm], with u = K t.
+        """Elastic energy ½ Σ t·u S of both bodies [N mm], with u = K t.
 
-        In an increment forces and moments do as much work as this grows by and slip dissipates.
-        Bulk strain does work as well, which neither counts. In a line contact, per mm, it counts up
-        to the datum of the half-space.
+        In an increment the work of forces and moments equals the growth of this energy plus the
+        energy dissipated by slip, but for the work of a bulk strain, which is in neither. For a
+        line contact the energy is per mm, and within the datum of the half-space.
         """
         return 0.5 * float(np.vdot(self.traction, self.displacement)) * self.cell_area

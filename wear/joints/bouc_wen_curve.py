@@ -134,14 +134,14 @@ def _respond_along(
 
 @dataclass(frozen=True)
 class TabulatedBoucWen(BoucWen):
-    """A :class:`wear.joints.BoucWen` of one σ and one exponent, for many increments at once.
+    """Bouc-Wen joints with one σ and one exponent, for many increments at once.
 
-    Its responses differ by the error of the rule, 2e-9 of the limit, of those that are marched
-    alone. Raises :class:`wear.joints.parameters.JointError` for several σ or exponents, too.
+    Responses agree with those of :class:`wear.joints.BoucWen` to the error of its integration, 2e-9
+    of the limit. Raise :class:`wear.joints.parameters.JointError` for several σ or exponents.
 
     Examples
     --------
-    A branch at a hundred places, which takes the curve and a few steps of the rule for each:
+    A branch at a hundred displacements takes the curve and a few steps for each of them:
 
     >>> import numpy as np
     >>> from wear.joints.bouc_wen import BoucWen
@@ -163,7 +163,7 @@ class TabulatedBoucWen(BoucWen):
             require(name, value, np.array(np.ndim(value) == 0), "one number for all joints")
 
     def respond(self, state: JointState, increment: Array) -> JointResponse:
-        """As :meth:`wear.joints.law.JointLaw.respond`."""
+        """Return the response, as :meth:`wear.joints.law.JointLaw.respond`."""
         exponent, gain = float(self.exponent), 2.0 * float(self.sigma) - 1.0
         if exponent in CLOSED:
             return super().respond(state, increment)
