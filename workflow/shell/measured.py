@@ -272,7 +272,7 @@ def _over(value: float, size: float) -> float | None:
 
 
 def _crossings(x: Array, y: Array, place: float) -> Array:
-    """Return the values ``(m,)`` of a polyline ``(n,)`` at a place: none outside, several in a loop."""
+    """Return the values ``(m,)`` of a polyline ``(n,)`` at a place, several if it is a loop."""
     known = np.isfinite(x) & np.isfinite(y)
     if not known.any():
         return np.empty(0)

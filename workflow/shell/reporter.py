@@ -214,7 +214,7 @@ class Reporter:
             self._course.row.doing(text)
 
     def reached(self, share: float, text: str = "") -> None:
-        """Report that about this ``share`` of the present part is done, with a description ``text``."""
+        """Report that about this ``share`` of the present part is done; ``text`` describes it."""
         if self._course is not None:
             with self.isolated(FORECAST):
                 self._tell(self._course, share, text)

@@ -166,7 +166,7 @@ class RunSteps:
         return handed_on
 
     def _read(self, data: bytes, name: str) -> Any:
-        """Return the result of a step, and repeat its warnings. Raises UserError for another step."""
+        """Return the result of a step and repeat its warnings. Raises UserError for other steps."""
         try:
             written, value, warnings = unpacked(data)
         except PackingError as error:
