@@ -1,4 +1,4 @@
-"""Measured points beside computed curves: known deviations, and what cannot be compared."""
+"""Tests of measured points and computed curves: known deviations, and refused comparisons."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_entries_that_disagree_are_refused(given: dict[str, Any], wrong: str) ->
 
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
-    """Depth and volume of a contact, one a thousand times the other in numbers."""
+    """Return depth and volume of a contact, whose numbers differ by a factor of a thousand."""
     path = tmp_path / "results.h5"
     cycles = np.linspace(0.0, 1e4, 51)
     with h5py.File(path, "w") as file:
