@@ -12,7 +12,7 @@ from fe_models.meshes.structure_mesh import Body, named_mesh
 
 INNER, OUTER, WIDTH = 20.0, 30.0, 6.0
 Y = np.array([0.0, 1.0, 0.0])
-# Of an axis that is none of the global ones.
+# Direction of an axis that is not a global one.
 OBLIQUE = np.array([1.0, 2.0, -0.5])
 THROUGH = np.array([3.0, -2.0, 5.0])
 

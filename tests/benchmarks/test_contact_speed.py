@@ -37,7 +37,7 @@ WORN = 0.02
 # the residual from 1e-4 to 1e-8; with 5 cells of 4082 changed it takes 12. Those of unlike
 # bodies are on a box of 96 x 96 cells, in units of the whole grid.
 ROUGH, UNLIKE, RATIO = (60, 25), 25, 4.0
-# Of 2048 x 2048 cells: convolutions and memory [GB].
+# Allowed for 2048 x 2048 cells: convolutions and memory [GB].
 LARGEST, LARGEST_MEMORY = 20, 6.0
 FIRST = 0.3  # seconds of the first solve
 
@@ -54,7 +54,7 @@ def roughness(grid: Grid, hurst: float, shortest: float) -> Array:
     """Return a self-affine field of root mean square 1, without waves below ``shortest`` cells."""
     noise = np.fft.fft2(np.random.default_rng(0).standard_normal(grid.shape))
     wave = np.hypot(*np.meshgrid(*(np.fft.fftfreq(n) for n in grid.shape), indexing="ij"))
-    # Of the amplitude: the spectrum of heights falls by twice that.
+    # Exponent of the amplitude; the power spectrum of heights has twice that.
     falls = np.maximum(wave, 1.0 / (LONGEST * grid.shape[0])) ** -(1.0 + hurst)
     falls[wave > 1.0 / shortest] = 0.0
     field = np.fft.ifft2(noise * falls).real

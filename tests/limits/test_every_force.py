@@ -32,7 +32,7 @@ KT, LIMIT = 45e3, 0.88 * 60.0
 SPAN = (20.0, 400.0)
 FORCES = (*range(1, 14, 4), *range(16, 50, 6), 53, 55, 57, 58, 60, 63, 66, 67, 68, 70, 76, 83, 90)
 STEPS = ContinuationControl(most=0.1)
-# Of the balance: what Newton's method leaves is a share of terms that may cancel.
+# Tolerance of the balance: Newton's residual is relative to terms that may cancel.
 BALANCED = 1e-7
 
 

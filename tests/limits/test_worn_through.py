@@ -70,7 +70,7 @@ def run(folder, loads, *overrides):
     ],
 )
 def test_a_run_ends_at_its_depth_and_not_a_step_beyond(tmp_path, step):
-    """The last step is shortened: the depth is exceeded by at most a hundredth of a step."""
+    """The last step is shortened, so that the depth is met within a hundredth."""
     summary = run(tmp_path, SLIDES, f"wear.stop.depth={REACHED}", f"wear.step={step}")
     depth = max(summary["interface"]["depth_1"], summary["interface"]["depth_2"])
     assert depth == pytest.approx(REACHED, rel=0.01)

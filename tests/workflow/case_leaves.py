@@ -349,7 +349,7 @@ APART_MATRICES = {
 APART = f"structure.matrices={APART_MATRICES | {'units': {'length': 'mm', 'force': 'N'}}}"
 # A sector of a wheel in the place of the template's mesh, with the same names.
 SECTOR = "structure.file=sector.msh"
-# What the entries of a section need beside it.
+# Further overrides that the entries of a section need.
 WITH_SECTION = {
     "structure.other_bodies.": [f"structure.contacts={BOLTED}"],
     "ring.": RING,

@@ -91,7 +91,7 @@ ASSEMBLY = """\
 *Static
 *End Step
 """
-# Two blocks, pressed together and then pushed to and fro without sliding off.
+# Two blocks, pressed together and then pushed back and forth without sliding off.
 BLOCKS = {
     "body_1": "Base-1",
     "body_2": "Foot-1",

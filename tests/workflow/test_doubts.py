@@ -103,7 +103,7 @@ def told_of(kind: str, slip: str, folder: Path) -> list[str]:
     return list(doubts_of(load_case(path, [slip, *BESIDE.get(slip, ())])))
 
 
-# What else has to be changed for a case to be valid.
+# Further changes that make a case valid.
 BESIDE = {
     "load_path.stroke=20 mm": ("contact.size=40 mm",),
     "excitation.frequency=100 kHz": ("integration.step=0.1 us",),

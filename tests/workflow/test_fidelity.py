@@ -280,7 +280,7 @@ def test_record_makes_the_case(plane_path, tmp_path):
     read = json.loads(json.dumps(record))
     assert dump_case(changed(case, read["chosen"])) == dump_case(chosen)
     assert read_again(chosen, tmp_path) == chosen
-    # What is physics stays as written.
+    # The physical settings stay as written.
     assert chosen.contact.method == case.contact.method
     assert chosen.friction == case.friction
     assert chosen.wear.blade == case.wear.blade

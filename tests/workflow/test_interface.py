@@ -13,7 +13,7 @@ from tests.workflow.interruptions import ctrl_c_after_jumps
 
 SPHERE = CASES / "sphere_normal.yaml"
 SMALL = {"contact__grid": [32, 32], "output__paraview": False, "output__figures": False}
-# A ball that is pressed, and pushed to and fro.
+# A ball that is pressed, and pushed back and forth.
 BALL = {
     "title": "Ball on a flat",
     "analysis": "contact",

@@ -59,7 +59,7 @@ def test_noise_of_known_size_has_its_chi_square_and_points_on_the_curve_have_non
     noise = np.random.default_rng(7).normal(0.0, sigma, places.size)
     points = Points(places, 2.0 * places + 1.0 + noise, np.full(places.size, sigma))
     found = told(compared(entry(), line, points))
-    # Of n independent points chi² per point is 1, give or take sqrt(2/n).
+    # For n independent points chi² per point is 1 with a standard deviation of sqrt(2/n).
     assert abs(found["reduced_chi_square"] - 1.0) < 4.0 * np.sqrt(2.0 / places.size)
     assert found["mean_deviation"] == pytest.approx(-noise.mean(), abs=1e-14)
     assert found["rms_deviation"] == pytest.approx(np.sqrt(np.mean(noise**2)))

@@ -108,7 +108,7 @@ def test_a_cycle_dissipates_as_finely_divided_ones_do() -> None:
     fine = energies(88, 32)[0]
     by_state, by_increment = energies(11, 4)
     assert by_state == pytest.approx(fine, rel=0.015)
-    # Of one flank; the other is its mirror image but for the mesh.
+    # Only one flank, as the other is its mirror image except for the mesh.
     assert by_state == pytest.approx(by_increment, rel=1e-4)
 
 

@@ -23,7 +23,7 @@ from workflow.kinds import load_case, parse_case, template
 CASES = Path(__file__).parents[2] / "cases"
 STEEL = Material(200e3, 0.3)
 ALPHA = 1.5e-9
-# What the solver and its bookkeeping leave.
+# Tolerance for the solver and its bookkeeping.
 SOLVER = 1e-9
 SMALL = """\
 title: Small pair

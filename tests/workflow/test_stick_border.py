@@ -122,7 +122,7 @@ def test_a_cylinder_tells_where_its_cells_put_the_border(tmp_path, strips) -> No
 def test_a_cylinder_that_slides_has_no_such_border(tmp_path) -> None:
     found = errors(tmp_path, ("P: 700 N/mm", "shift_x", "8 um"), 32, ", cycles: 5e3", "1e4")
     assert found["depth_1"] > 0.0
-    assert found["error"]["volume"]["grid"] is None  # no lives are lived here
+    assert found["error"]["volume"]["grid"] is None  # no probe runs in tests
 
 
 SPHERES = {

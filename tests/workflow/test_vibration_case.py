@@ -36,7 +36,7 @@ resolution: {harmonics: 1, samples: 4096}
 output: {figures: false}
 """
 STIFFNESS = 1e4
-# Of the solver, over a resonance of moderate damping.
+# Tolerance of the solver over a resonance of moderate damping.
 SOLVED = 1e-7
 # Half the peak-to-peak motion is taken at 1024 times of a period: at most (π/1024)²/2 too small.
 SAMPLED = 5e-6

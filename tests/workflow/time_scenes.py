@@ -7,7 +7,7 @@ import numpy as np
 
 from tests.workflow.conftest import invoke
 
-# What closed forms and marched cycles leave: rounding.
+# Tolerance for the rounding of closed forms and marched cycles.
 ROUNDING = 1e-12
 
 JOINT = """\
