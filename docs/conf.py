@@ -1,4 +1,4 @@
-"""How Sphinx builds the pages: `make docs`."""
+"""Configuration of Sphinx for the documentation: `make docs`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
 BUILT = HERE / "_build"
 
-# Tutorials run the command of this environment and checkout, without colours or bars: notebooks ask
-# for both, whatever the command's output is.
+# Tutorials run the command of this environment and checkout, without the colours and progress bars
+# that notebooks request for any output.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent), os.environ.get("PYTHONPATH", "")])
 os.environ |= {"COLUMNS": "100", "NO_COLOR": "1", "TTY_COMPATIBLE": "0", "MPLBACKEND": "agg"}
@@ -23,13 +23,13 @@ os.environ["IPYTHONDIR"] = str(BUILT / "ipython")
 STARTUP = BUILT / "ipython" / "profile_default" / "startup"
 STARTUP.mkdir(parents=True, exist_ok=True)
 shutil.copy(HERE / "_ext" / "bash_cell.py", STARTUP)
-# Which kernel runs a page, and how it talks to its notebook, is nobody's concern here.
+# Messages about the kernel of a page and its connection are suppressed.
 (STARTUP.parent / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 40\n")
 logging.getLogger("traitlets").setLevel(logging.WARNING)
 
 
 def digest() -> str:
-    """What tells versions of the packages apart: what an older one has printed is run again."""
+    """Return a digest of the packages' code, so that notebooks run again after it changes."""
     found = hashlib.sha256()
     for package in ("sa_solver", "wear", "fe_models", "workflow"):
         for file in sorted((HERE.parent / package).rglob("*.py")):
@@ -55,7 +55,7 @@ extensions = [
 ]
 exclude_patterns = ["_build", "**.ipynb_checkpoints"]
 nitpicky = True
-# Modules that packages speak of have no page of their own.
+# Modules mentioned in docstrings have no separate page.
 nitpick_ignore_regex = [("py:mod", r"(sa_solver|wear|fe_models)\..*")]
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
@@ -66,12 +66,12 @@ nb_execution_mode = "cache"
 nb_execution_cache_path = str(BUILT / "executed" / digest())
 nb_execution_in_temp = True
 nb_execution_show_tb = True  # a cell that fails is a warning, hence an error of the build
-nb_execution_timeout = -1  # however busy the machine is
+nb_execution_timeout = -1  # no limit, because the machine may be busy
 nb_merge_streams = True
 nb_render_markdown_format = "myst"
 
 autodoc_typehints = "signature"
-# Types of attributes stand in the signature; as text, names such as np.bool_ would be links.
+# Types of attributes are in the signature; as text, names such as np.bool_ would become links.
 napoleon_attr_annotations = False
 autodoc_type_aliases = {name: name for name in ("Array", "Flags", "Indices", "Mask", "Parameter")}
 python_maximum_signature_line_length = 88

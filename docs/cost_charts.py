@@ -1,11 +1,11 @@
-"""Figures and tables of `docs/cost.md`: what work costs by its size, up to the largest.
+"""Figures and tables of `docs/cost.md`: cost of work by its size, up to the largest.
 
     python docs/cost_charts.py [--draw] [CHART ...]
 
-`make docs-figures` draws them too. Every point is measured in a process of its own, in seconds of
-the processor on one thread (`docs/cost_works.py`); with ``--draw`` those measured before are drawn
-anew. Lines have their slope beside them: how cost grows with size, the power of the upper half of
-the points.
+`make docs-figures` draws them too. Every point is measured in a separate process, as processor
+seconds on one thread (`docs/cost_works.py`); with ``--draw`` the stored points are drawn again.
+Each line is labelled with its slope, the exponent of the growth of the cost with size, fitted to
+the upper half of the points.
 """
 
 from __future__ import annotations
@@ -35,24 +35,25 @@ from workflow.shell.processes import environment
 
 FIGURES = ROOT / "docs" / "figures"
 MEASURES = ("seconds", "count", "memory")
-# What stands on structures that are condensed before: memory that this takes would be in theirs.
+# Works that need a condensed structure; it is prepared in advance, so that its memory is excluded.
 PREPARED = ("missions", "harmonics", "contacts")
 HEIGHT = 5.2
-# Sizes that have a number at the axis; its ends differ by this share at least.
+# Number of labelled sizes at an axis, and smallest ratio of the ends of the axis.
 TICKS, LEAST_SPAN = 4, 3.0
-# Points that a slope is told of at least, and memory [GB] below which what libraries keep blurs it.
+# Smallest number of points for a slope, and memory [GB] below which memory kept by libraries
+# distorts it.
 FEWEST, LEAST_MEMORY = 3, 0.02
-# Columns of the table of the largest: seconds of the processor, and memory of the machine [GB].
+# Columns of the table of largest sizes: processor seconds, and memory of the machine [GB].
 TIMES, MACHINE = {"10 s": 10.0, "1 min": 60.0, "10 min": 600.0}, 24.0
-# How far a slope is believed beyond the largest that was measured.
+# Largest factor of extrapolation beyond the largest measured size.
 FURTHER = 2.5
 
 
 @dataclass(frozen=True)
 class Line:
-    """A ``work`` of :mod:`cost_works`, what it is, and the sizes it is measured at.
+    """Line of a chart: a ``work`` of :mod:`cost_works`, its name, and the sizes it is measured at.
 
-    It counts ``counted``; ``largest`` says what a size is in words.
+    The work counts what ``counted`` names; ``largest`` describes a size in words.
     """
 
     work: str
@@ -64,7 +65,7 @@ class Line:
 
 @dataclass(frozen=True)
 class CostChart:
-    """Works over the same kind of ``size``, in one figure."""
+    """Chart of works over the same kind of ``size``, in one figure."""
 
     title: str
     size: str
@@ -72,7 +73,7 @@ class CostChart:
 
 
 Points = Mapping[str, Array]
-"""Sizes of a work, and each measure of it."""
+"""Sizes of a work, and the values of each measure."""
 
 
 def _cells(size: int) -> str:
@@ -138,7 +139,7 @@ CHARTS: Mapping[str, CostChart] = {
 
 
 def measure(name: str) -> None:
-    """Measure all points of a chart, each as soon as it is known: what is cut off is kept."""
+    """Measure all points of a chart; each is stored at once, so that an interruption loses none."""
     chart = CHARTS[name]
     with TemporaryDirectory() as cache, environment({"FRETSCALE_CACHE": cache}):
         rows: list[dict[str, Any]] = []
@@ -150,7 +151,7 @@ def measure(name: str) -> None:
 
 
 def _point(work: str, size: int) -> dict[str, float]:
-    """One of them, in a process of its own."""
+    """Measure one point in a separate process."""
     command = [sys.executable, str(ROOT / "docs" / "cost_works.py"), work, str(size)]
     if work in PREPARED:
         subprocess.run([*command, "--prepare"], check=True)
@@ -159,11 +160,11 @@ def _point(work: str, size: int) -> dict[str, float]:
     return found
 
 
-# --- what is kept -------------------------------------------------------------------------------
+# --- stored points ------------------------------------------------------------------------------
 
 
 def stored(name: str, folder: Path = FIGURES) -> dict[str, Points]:
-    """The points of a chart that were measured last, by their work."""
+    """Return the stored points of a chart, by their work."""
     with (folder / f"cost_{name}.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     chart, points = CHARTS[name], {}
@@ -177,7 +178,7 @@ def stored(name: str, folder: Path = FIGURES) -> dict[str, Points]:
 
 
 def _columns(chart: CostChart) -> dict[str, str]:
-    """What each measure is called in the table."""
+    """Return the column of each measure in the table."""
     counted = " or ".join(dict.fromkeys(line.counted for line in chart.lines))
     return {
         "size": chart.size,
@@ -200,7 +201,7 @@ def _write(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def slope(size: Array, cost: Array) -> float | None:
-    """The power by which a cost grows with size, of the upper half of its points."""
+    """Return the exponent by which a cost grows with size, from the upper half of its points."""
     upper = max(FEWEST, ceil(len(size) / 2))
     if len(size) < upper or cost[-upper:].min() <= 0.0:
         return None
@@ -211,7 +212,7 @@ def slope(size: Array, cost: Array) -> float | None:
 
 
 def cost_figure(name: str) -> Figure:
-    """Each measure against size, both logarithmic, a line for each work."""
+    """Draw each measure against size on logarithmic axes, with a line for each work."""
     chart, points = CHARTS[name], stored(name)
     figure = new_figure(chart.title, HEIGHT)
     panels = figure.subplots(1, len(MEASURES), sharex=True)
@@ -232,12 +233,12 @@ def cost_figure(name: str) -> Figure:
 
 
 def _seen(measure: str, cost: Array) -> Array:
-    """Which costs are large enough to be told."""
+    """Return a mask of the costs that are large enough to be shown."""
     return np.asarray(cost > (LEAST_MEMORY if measure == "memory" else 0.0))
 
 
 def _label(line: Line, own: Points) -> str:
-    """Name of a line, and how its costs grow."""
+    """Return the label of a line: its name and the growth of its costs."""
     grows = []
     for measure, name in (("seconds", "time"), ("memory", "memory")):
         seen = _seen(measure, own[measure])
@@ -248,14 +249,15 @@ def _label(line: Line, own: Points) -> str:
     return f"{line.name} ({line.counted}){powers}"
 
 
-# --- how large ----------------------------------------------------------------------------------
+# --- largest sizes ------------------------------------------------------------------------------
 
 
 def limits() -> list[list[str]]:
-    """How large each work may be in some times, and in the memory of a machine.
+    """Return a table of the largest size of each work for some times and for a machine's memory.
 
-    Between what was measured by powers; up to two and a half times the largest by the slope of the
-    upper half, there it is said to be about so much; beyond that to be over the largest.
+    Between measured sizes the cost is interpolated by powers. Up to two and a half times the
+    largest size it is extrapolated by the slope of the upper half, marked by "about"; beyond that
+    the entry is "over" the largest size.
     """
     rows = [["work", *(f"in {time}" for time in TIMES), f"in {MACHINE:g} GB", "largest measured"]]
     for name, chart in CHARTS.items():
@@ -277,7 +279,7 @@ def _of(name: str) -> str:
 
 
 def _reach(line: Line, own: Points, measure: str, most: float) -> str:
-    """The size whose cost is ``most``."""
+    """Return the size whose cost is ``most``."""
     seen = _seen(measure, own[measure])
     size, cost = own["size"][seen], own[measure][seen]
     power = slope(size, cost)
@@ -291,13 +293,13 @@ def _reach(line: Line, own: Points, measure: str, most: float) -> str:
 
 
 def _rounded(size: float) -> int:
-    """Two digits."""
+    """Round to two digits."""
     digits = max(0, len(str(int(size))) - 2)
     return int(round(size, -digits))
 
 
 def main(arguments: list[str]) -> None:
-    """Store the charts named, of all if none is."""
+    """Store the charts named, or all."""
     names = [name for name in arguments if name != "--draw"] or list(CHARTS)
     for name in names:
         if "--draw" not in arguments:

@@ -1,12 +1,12 @@
-"""What `docs/cost_charts.py` measures: one work of one size, alone in this process.
+"""Works measured by `docs/cost_charts.py`: one work of one size, alone in this process.
 
     python docs/cost_works.py WORK SIZE [--prepare]
 
-prints as JSON how large it is, its seconds of the processor, what it counts, and by how much its
-peak memory is above what the loaded program had, in GB. The same work in small comes first: modules
-are loaded and loops compiled with that. Contacts are done at least twice, the first
-time with their transforms set up, and the least time counts. With ``--prepare`` what a work stands
-on, a condensed structure, is brought to the cache, and nothing is measured.
+prints as JSON the size, the processor seconds, the counted quantity, and the peak memory above that
+of the loaded program, in GB. The same work is first done in small, which loads modules and compiles
+loops. Contacts are computed at least twice, since the first time sets up their transforms, and the
+smallest time counts. With ``--prepare`` the condensed structure that a work needs is written to the
+cache, and nothing is measured.
 """
 
 from __future__ import annotations
@@ -56,15 +56,15 @@ from workflow.shell.reporter import Reporter
 CASES = Path(__file__).parent.parent / "cases"
 TITANIUM, FRICTION = Material(115e3, 0.29), 0.5
 ALIKE, UNLIKE = ElasticPair(TITANIUM, TITANIUM), ElasticPair(Material(np.inf, 0.3), TITANIUM)
-# Contacts are done again, for transforms are set up the first time, but for those that take longer
-# than some seconds; within less of them more often, up to a number of times.
+# Contacts that take less than LONG seconds are computed again, because the first time sets up the
+# transforms; within SHORT seconds they are repeated, up to TRIES times.
 LONG, SHORT, TRIES = 200.0, 2.0, 5
 AGAIN = ("normal", "friction", "unlike")
-# Contact radius over half the grid's width, and the shear load over µP.
+# Ratio of the contact radius to half the grid's width, and of the shear load to µP.
 CONTACT_SHARE, SHEAR_SHARE = 0.6, 0.75
-# Nodes across a flank of the default dovetail, and along it.
+# Number of nodes across and along a flank of the default dovetail.
 FLANK = np.array([20, 34])
-# Nodes along a side of the blocks of a stack, whose cycle has four increments.
+# Number of nodes along a side of the blocks of a stack, and its cycle of four increments.
 SIDE, PATH = 16, np.array([[1.0, 0.5], [1.0, 1.0], [1.0, 0.0], [1.0, -1.0]])
 # The shipped rig: nodes along a side of its pads less one, odd harmonics, force [N], span [Hz].
 PAD, ODD, FORCE, SPAN = 10, 5, 10.0, (50.0, 500.0)
@@ -72,7 +72,7 @@ STEPS = ContinuationControl(most=0.1)
 
 
 class Sized(NamedTuple):
-    """A work to be measured, and how large it is; called, it gives what it counts."""
+    """Work to be measured, with its size; calling it returns the counted quantity."""
 
     size: int
     run: Callable[[], int]
@@ -82,14 +82,14 @@ class Sized(NamedTuple):
 
 
 def normal(cells: int) -> Sized:
-    """A sphere pressed on so many cells along each side, cold; counts convolutions."""
+    """Press a sphere on ``cells`` cells along each side, from a cold start; count convolutions."""
     height, half_space, hertz = _sphere(cells, ALIKE)
     contact = NormalContact(half_space)
     return Sized(cells, lambda: contact.solve(height, hertz.load).convolutions)
 
 
 def friction(cells: int, pair: ElasticPair = ALIKE) -> Sized:
-    """The same, then sheared by three quarters of what friction carries; counts convolutions."""
+    """Press a sphere, then shear it by three quarters of the friction limit; count convolutions."""
     height, half_space, hertz = _sphere(cells, pair)
     contact = FrictionalContact(half_space, FRICTION)
 
@@ -116,7 +116,7 @@ def _sphere(cells: int, pair: ElasticPair) -> tuple[Any, HalfSpace, HertzSphere]
 
 
 def condensation(nodes: int) -> Sized:
-    """The default dovetail with so many nodes across each flank; counts unknowns of its mesh."""
+    """Condense the default dovetail with ``nodes`` nodes across each flank; count unknowns."""
     stage = _dovetail(nodes)
     bodies = stage.mesh.bodies
 
@@ -128,7 +128,7 @@ def condensation(nodes: int) -> Sized:
 
 
 def missions(nodes: int) -> Sized:
-    """Its two missions of 22 increments with friction, once condensed; counts iterations."""
+    """Solve both missions of the dovetail, 22 increments with friction; count iterations."""
     stage = _dovetail(nodes)
     structure, joint, model = stage.structure, stage.joint, stage.model
     cycle = partial(structure.solve_cycle, joint, model.load_cycles[0].amplitudes, structure.gap())
@@ -142,7 +142,7 @@ def missions(nodes: int) -> Sized:
 
 
 def stack(bodies: int) -> Sized:
-    """So many blocks on each other, each pressed and sheared by friction; counts unknowns."""
+    """Press and shear ``bodies`` stacked blocks with friction; count unknowns."""
     structure = _stack(bodies)
 
     def run() -> int:
@@ -185,12 +185,12 @@ def _dovetail(nodes: int) -> StructureLoads:
 
 
 def harmonics(odd: int) -> Sized:
-    """A response of the rig's 121 contacts, the mean and so many odd harmonics; counts points."""
+    """Compute a response of the rig's 121 contacts with ``odd`` odd harmonics; count points."""
     return Sized(odd, partial(_response, _rig(PAD), odd))
 
 
 def contacts(elements: int) -> Sized:
-    """The same with five odd harmonics and so many elements along each side of the pads."""
+    """Compute such a response with five odd harmonics and ``elements`` elements along each pad."""
     problem = _rig(elements)
     return Sized((elements + 1) ** 2, partial(_response, problem, ODD))
 
@@ -230,13 +230,13 @@ WORKS: dict[str, tuple[Callable[[int], Sized], int]] = {
 
 
 def measured(work: str, size: int) -> dict[str, float]:
-    """One work, after the same in small."""
+    """Measure one work, after doing the same in small."""
     make, small = WORKS[work]
-    loops.PAYS = 0  # a process that goes on for long has turned to compiled loops
+    loops.PAYS = 0  # as in a process that runs for long, which uses compiled loops
     make(small).run()
     before = _peak(anew=True)
     sized = make(size)
-    # What it took to get there, a mesh or a reduction, is not of the work; what it keeps is.
+    # The memory of the preparation, a mesh or a reduction, is excluded, except for what remains.
     _peak(anew=True)
     times, count = list[float](), 0
     while not times or (work in AGAIN and _again(times)):
@@ -248,14 +248,14 @@ def measured(work: str, size: int) -> dict[str, float]:
 
 
 def _again(times: list[float]) -> bool:
-    """Whether a work that took these seconds is worth another try."""
+    """Return whether a work that took these seconds is measured again."""
     if len(times) == 1:
         return times[0] < LONG
     return sum(times) < SHORT and len(times) < TRIES
 
 
 def _peak(anew: bool = False) -> float:
-    """Most memory of this process [GB], as Linux tells it; ``anew``: counted from now on."""
+    """Return the peak memory of this process [GB] from Linux; ``anew`` restarts its measurement."""
     own = Path("/proc/self")
     if anew:
         (own / "clear_refs").write_text("5", encoding="ascii")

@@ -1,9 +1,11 @@
-"""Figures of the theory and of README, from runs: `make docs-figures`, or
+"""Figures of the theory and of README, drawn from runs.
+
+They are drawn by `make docs-figures`, or by
 
     python docs/draw_figures.py RUNS [FIGURE ...]
 
-Each has its command beside it, which takes up to half an hour; runs that are finished below RUNS
-are taken, and their figures drawn anew.
+The command of each figure is listed with it, and takes up to half an hour. Finished runs below RUNS
+are reused, and only their figures are drawn again.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from pathlib import Path
 
 from draw_gallery import ROOT, store, store_anew
 
-# The figure of the run that is taken, and the command.
+# The figure of the run that is used, and the command.
 FIGURES = {
     "pressure_profiles": ("pressure_profiles", "run cases/dovetail.yaml"),
     "rig_response": ("frequency_response", "run cases/rig_harmonic_balance.yaml"),
@@ -33,7 +35,7 @@ FIGURES = {
 
 
 def main(runs: Path, names: list[str]) -> None:
-    """Store the figures named, of all if none is."""
+    """Store the figures named, or all."""
     for name in names or FIGURES:
         figure, command = FIGURES[name]
         if not (runs / name / "summary.json").exists():

@@ -1,10 +1,12 @@
-"""Pictures of the gallery, from runs of the shipped cases: `make docs-gallery`, or
+"""Pictures of the gallery, drawn from runs of the shipped cases.
+
+They are drawn by `make docs-gallery`, or by
 
     python docs/draw_gallery.py RUNS [CASE ...]
 
-Runs that are not finished below RUNS are computed there first: about 20 minutes of one core for all
-of them. Of each the figure that docs/gallery/scenes.yaml names is drawn anew from its results, as
-the program draws it now, and stored, small, beside it.
+Runs that are not finished below RUNS are computed first, which takes about 20 minutes on one core
+for all cases. The figure of each that docs/gallery/scenes.yaml names is drawn again from the
+results with the current program, and stored at a small size next to that file.
 """
 
 from __future__ import annotations
@@ -26,14 +28,14 @@ from workflow.shell.results import read_contents
 ROOT = Path(__file__).parent.parent
 GALLERY = ROOT / "docs" / "gallery"
 WIDTH = 900
-# Of a palette, the first that is small enough. Chosen for its spread and then fitted, it keeps the
-# colours of lines apart, which have few dots.
+# Palette sizes; the first that makes a small enough file is used. A palette that is chosen for its
+# spread and then fitted keeps the colours of lines distinct although they have few pixels.
 COLOURS, FITTED = (128, 64, 48), 3
 LARGEST = 60_000  # bytes
 
 
 def main(runs: Path, names: list[str]) -> None:
-    """Store the pictures of the cases named, of all if none is."""
+    """Store the pictures of the cases named, or of all."""
     scenes = YAML(typ="safe").load(GALLERY / "scenes.yaml")
     for name in names or scenes:
         if not (runs / name / "summary.json").exists():
@@ -44,7 +46,7 @@ def main(runs: Path, names: list[str]) -> None:
 
 
 def store_anew(run: Path, figure: str, small: Path) -> None:
-    """A figure of a finished run, drawn from its results."""
+    """Draw a figure of a finished run from its results, and store it at a small size."""
     results, pictures = run / "results.h5", analysis_of(load_case(run / "case.yaml")).pictures()
     contents = read_contents(results, pictures.contents)
     with TemporaryDirectory() as folder, h5py.File(results) as file:
@@ -54,7 +56,7 @@ def store_anew(run: Path, figure: str, small: Path) -> None:
 
 
 def store(picture: Path, small: Path) -> None:
-    """A figure in a width and in colours that make tens of kilobytes."""
+    """Store a figure with a width and a palette that make tens of kilobytes."""
     with Image.open(picture) as image:
         height = round(image.height * WIDTH / image.width)
         scaled = image.convert("RGB").resize((WIDTH, height), Image.Resampling.LANCZOS)

@@ -2,9 +2,9 @@
 
     python docs/method_charts.py [CHART ...]
 
-`make docs-figures` draws them too. Every rung is computed here, in seconds of the processor on one
-thread: what else the machine does is not in them. They are drawn as `fretscale chart` draws whole
-runs.
+`make docs-figures` draws them too. Every rung is computed here and timed in processor seconds on
+one thread, which other work on the machine does not affect. The charts look like those that
+`fretscale chart` draws of whole runs.
 """
 
 from __future__ import annotations
@@ -53,14 +53,15 @@ from workflow.pictures.style import write_figures
 Result = TypeVar("Result")
 
 REQUIRED = 0.01
-# Of each order, the one taken by default last; its finest mesh is what all are held against.
+# Mesh sizes for each order of elements; the default order is last, and its finest mesh is the
+# reference for all.
 NODES = {1: (11, 21, 40, 79, 157, 313), 2: (11, 21, 40, 79, 157, 313)}
 ELEMENTS = {1: (6, 10, 14, 20), 2: (6, 10, 14)}
 DEFAULT_ORDER = 2
-# Increments of each leg, those of the reference, and what `contact.accuracy` may ask for.
+# Increments of each leg, those of the reference, and values of `contact.accuracy`.
 INCREMENTS, FINEST = (1, 2, 4, 8, 16, 32, 64), 256
 ACCURACIES = (0.1, 0.05, ACCURACY, 0.01, 0.005)
-# Of a search for the worst plane, by its refinements.
+# Refinements of a search for the worst plane.
 PLANES, HISTORIES = {0: (10, 30, 100, 300, 1000), 6: (10, 30, 100, 300)}, 300
 
 
@@ -68,7 +69,7 @@ PLANES, HISTORIES = {0: (10, 30, 100, 300, 1000), 6: (10, 30, 100, 300)}, 300
 
 
 def structure() -> Ladder:
-    """The unworn cycle of the dovetail's section, on meshes of both orders."""
+    """Chart the unworn cycle of the dovetail's section, on meshes of both orders."""
     axis = Axis("structure", "nodes across a flank of the dovetail's section", _nothing, order=2.0)
     return judge(axis, _meshes("dovetail_2d", "nodes", NODES, 40, _mission), {}, {})
 
@@ -89,7 +90,7 @@ def _mission(case: Any) -> dict[str, float]:
 
 
 def specimens() -> Ladder:
-    """The curved specimens, unworn under 250 N, on meshes of both orders."""
+    """Chart the curved specimens, unworn under 250 N, on meshes of both orders."""
     axis = Axis("specimens", "elements across the pad", _nothing, order=2.0)
     return judge(axis, _meshes("specimens_curved", "elements", ELEMENTS, 10, _cycle), {}, {})
 
@@ -110,9 +111,9 @@ def _cycle(case: Any) -> dict[str, float]:
 
 
 def history() -> Ladder:
-    """A cylinder on a rigid flat, pressed, sheared by half of what friction bears, and back.
+    """Chart a cylinder on a rigid flat, pressed, sheared by half of the friction limit, and back.
 
-    Errors are those of the shear at the ends of the legs, summed over the cells, over µP.
+    Errors are those of the shear at the ends of the legs, summed over the cells, relative to µP.
     """
     grid = Grid.strips(1.2, 256)
     half_space = HalfSpace(grid, ElasticPair(Material(np.inf, 0.3), Material(115e3, 0.29)))
@@ -134,7 +135,7 @@ def history() -> Ladder:
         marched = march_history(half_space, height, path, friction=0.5, accuracy=accuracy)
         return np.array([state.shear for state in marched.states])
 
-    # Steps are of first order: two references tell what is left of it.
+    # Steps are of first order, so two references give the remaining error by extrapolation.
     exact = 2.0 * in_increments(FINEST) - in_increments(FINEST // 2)
 
     def error(shear: Array) -> float:
@@ -157,7 +158,7 @@ def history() -> Ladder:
 
 
 def planes() -> Ladder:
-    """Findley's parameter of random histories of 8 states, lost in the worst hundredth of them."""
+    """Chart Findley's parameter of random histories of 8 states: loss in the worst hundredth."""
     stress = 100.0 * np.random.default_rng(1).standard_normal((8, 6, HISTORIES))
 
     def search(planes: int, refinements: int) -> Array:
@@ -190,21 +191,21 @@ CHARTS: Mapping[str, tuple[Callable[[], Ladder], float]] = {
 
 
 def _nothing(case: Any) -> Any:
-    """An axis of no case."""
+    """Return the case axis of a chart without cases."""
     return iter(())
 
 
 def _judged(
     rung: Rung, own: bool, work: Callable[[], Result], error: Callable[[Result], float]
 ) -> Judged:
-    """A rung whose error is known."""
+    """Return a rung whose error is known."""
     result, seconds = _timed(work)
     point, wrong = Point(rung, own, "", {}, Cost(seconds, 0, 0)), error(result)
     return Judged(point, wrong, "", wrong, seconds, False, False, False)
 
 
 def _ladder(axis: Axis, rungs: list[Judged]) -> Ladder:
-    """Such rungs, the efficient ones marked."""
+    """Return a ladder of such rungs, with the efficient ones marked."""
     flags = efficient([rung.seconds for rung in rungs], [rung.error for rung in rungs])
     marked = [replace(rung, by_seconds=flag) for rung, flag in zip(rungs, flags, strict=True)]
     return Ladder(axis, tuple(marked), {}, {})
@@ -217,9 +218,9 @@ def _meshes(
     default: int,
     measured: Callable[[Any], dict[str, float]],
 ) -> list[Point]:
-    """A case on each of the meshes; ``default`` nodes or elements are its own."""
+    """Return points of a case on each mesh; ``default`` nodes or elements are its default."""
     points: list[Point] = []
-    measured(_on_mesh(name, 1, min(meshes[1]) / default))  # compiles what is to be compiled
+    measured(_on_mesh(name, 1, min(meshes[1]) / default))  # compiles the loops
     for order, counts in meshes.items():
         for count in counts:
             values, seconds = _timed(partial(measured, _on_mesh(name, order, count / default)))
@@ -230,7 +231,7 @@ def _meshes(
 
 
 def _on_mesh(name: str, order: int, finer: float) -> Any:
-    """A case whose elements are so much finer."""
+    """Return a case whose mesh is finer by a factor."""
     case: Any = load_case(ROOT / "cases" / f"{name}.yaml")
     mesh = case.mesh.model_dump(exclude_none=True) | {
         "order": order,
@@ -243,7 +244,7 @@ def _on_mesh(name: str, order: int, finer: float) -> Any:
 
 
 def _timed(work: Callable[[], Result]) -> tuple[Result, float]:
-    """What comes out, in how many seconds of the processor; nothing is in the cache."""
+    """Return the result of a work and its processor seconds, with nothing in the cache."""
     with TemporaryDirectory() as cache:
         os.environ["FRETSCALE_CACHE"] = cache
         began = time.process_time()
@@ -251,7 +252,7 @@ def _timed(work: Callable[[], Result]) -> tuple[Result, float]:
 
 
 def main(names: list[str]) -> None:
-    """Store the charts named, of all if none is."""
+    """Store the charts named, or all."""
     for name in names or CHARTS:
         chart, required = CHARTS[name]
         ladder = chart()

@@ -6,5 +6,5 @@ import pytest
 
 
 def slow(*values: Any) -> Any:
-    """Parameters of a test that take long, where others of it show the same quickly."""
+    """Mark parameters of a test as slow if other parameters show the same quickly."""
     return pytest.param(*values, marks=pytest.mark.slow)

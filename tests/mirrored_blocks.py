@@ -1,4 +1,4 @@
-"""A pad on a wider block, whole or cut by one or two planes of symmetry through their contact."""
+"""Pad on a wider block, whole or cut by one or two planes of symmetry through their contact."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ Mesh = MeshTet | MeshTri
 
 
 def along(*counts: tuple[float, float, int]) -> np.ndarray:
-    """Node coordinates of pieces ``(from, to, elements)`` one after the other."""
+    """Return the node coordinates of consecutive pieces ``(from, to, elements)``."""
     return np.unique(np.concatenate([np.linspace(a, b, n + 1) for a, b, n in counts]))
 
 
@@ -26,7 +26,7 @@ def with_faces(mesh: Mesh, faces: dict[str, tuple[int, float]]) -> Mesh:
 
 
 def mirrored(mesh: Mesh, axis: int) -> Mesh:
-    """The mesh with its mirror image at coordinate 0, nodes there shared."""
+    """Return the mesh with its mirror image at coordinate 0, where they share nodes."""
     points, count = mesh.p, mesh.p.shape[1]
     image = points.copy()
     image[axis] *= -1.0
@@ -38,10 +38,11 @@ def mirrored(mesh: Mesh, axis: int) -> Mesh:
 
 
 def pad_on_block(planes: Sequence[int] = (), match: bool = True) -> tuple[Body, Body]:
-    """Both, cut across the axes ``planes``: a pad of 2 x 2 x 1 mm that is one of mirror images.
+    """Return both bodies, cut across the axes ``planes``.
 
-    Where they do not ``match`` node to node the pad has nodes of its own. The top of the block is
-    its boundary ``top`` as far as the pad covers it, and the pad's ends across x are its ``rims``.
+    The pad of 2 x 2 x 1 mm consists of mirror images. If the bodies do not ``match`` node to node,
+    the pad has different nodes. The boundary ``top`` of the block is the part that the pad covers,
+    and the pad's ends across x are its ``rims``.
     """
     x, y = along((0, 1, 4), (1, 2, 2)), along((0, 1, 3), (1, 2, 2))
     block: Mesh = MeshTet.init_tensor(x, y, along((-2, -0.5, 2), (-0.5, 0, 2)))

@@ -1,11 +1,11 @@
-"""A pytest plugin: matrices of contacts and bodies, and direct solutions, are off by 1e-13.
+"""Pytest plugin that perturbs contact and body matrices and direct solutions by 1e-13.
 
-That is about what another processor's rounding does to them, one draw for each SEED. A test that
-fails with it, or a method that takes a thousand iterations, rests on luck.
+This is about the effect of another processor's rounding, with one draw for each SEED. A test that
+fails with it, or a method that takes a thousand iterations, relies on luck.
 
     SEED=3 python -m pytest -p tests.perturbed tests/sa_solver
 
-The same input is perturbed alike each time, and symmetric matrices stay symmetric.
+The same input is perturbed equally each time, and symmetric matrices stay symmetric.
 """
 
 import os
@@ -26,7 +26,7 @@ GAMMA, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111E
 
 
 def noise(values, places):
-    """Of [-1, 1), from the digits of each value and its place; a change of sign changes nothing."""
+    """Return numbers in [-1, 1) from the digits of each value and its place, but not its sign."""
     bits = np.abs(np.ascontiguousarray(values, dtype=np.float64)).view(np.uint64)
     bits = bits + (places.astype(np.uint64) + np.uint64(SEED)) * np.uint64(GAMMA)
     for shift, factor in ((30, FIRST), (27, SECOND)):
@@ -35,7 +35,7 @@ def noise(values, places):
 
 
 def off(values):
-    """An array of real numbers or a tuple with some in it, off by SIZE of each number."""
+    """Perturb an array of real numbers, or a tuple with such arrays, by SIZE of each number."""
     if isinstance(values, tuple):
         parts = map(off, values)
         return type(values)(*parts) if hasattr(values, "_fields") else tuple(parts)
@@ -45,7 +45,7 @@ def off(values):
 
 
 def off_symmetric(matrix):
-    """A symmetric sparse matrix off by SIZE of each entry, and still symmetric."""
+    """Perturb a symmetric sparse matrix by SIZE of each entry, and keep it symmetric."""
     entries = matrix.tocoo()
     rows, columns = entries.row.astype(np.int64), entries.col.astype(np.int64)
     places = np.minimum(rows, columns) * matrix.shape[0] + np.maximum(rows, columns)
@@ -54,13 +54,13 @@ def off_symmetric(matrix):
 
 
 def perturb(owner, name):
-    """Let what a function or method returns be off."""
+    """Perturb the results of a function or method."""
     exact = getattr(owner, name)
     setattr(owner, name, wraps(exact)(lambda *given, **options: off(exact(*given, **options))))
 
 
 def perturb_property(owner, name):
-    """Let a cached sparse matrix be off."""
+    """Perturb a cached sparse matrix."""
     exact = owner.__dict__[name].func
     changed = cached_property(lambda self: off_symmetric(exact(self)))
     changed.__set_name__(owner, name)

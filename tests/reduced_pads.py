@@ -1,4 +1,4 @@
-"""Reduced specimens of crossed strips, and what the rig's tests do with them."""
+"""Reduced specimens of crossed strips, shared by the tests of the rig."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ STEEL = Material(200e3, 0.3, 7.8e-9)
 FRICTION, STROKE = 0.88, 14e-3
 # Depth per energy: 1500 µm³/J, the slope of the rig's tests.
 ALPHA = 1.5e-9
-# A share of the solver's rounding and of its exchange of nodes.
+# Relative tolerance for the solver's rounding and its exchange of nodes.
 SOLVER = 1e-9
 
 
 def pad_stiffnesses(specimen: Specimen, mesh: StructureMesh) -> list[Array]:
-    """Of both bodies in steel."""
+    """Return the stiffness of both bodies in steel."""
     models = reduced_specimens(specimen, mesh, (STEEL, STEEL), modes=0)
     return [pad_stiffness(model, specimen) for model in models]
 
 
 @cache
 def coarse_pads() -> tuple[Interface, list[Array]]:
-    """The pad of a coarse pair with its curved gap, and the stiffness of both bodies there."""
+    """Return the pad of a coarse pair with its curved gap, and the stiffness of both bodies."""
     specimen = Specimen(pad_elements=6, radii=(1000.0, 50.0))
     mesh = specimen.mesh(2.0)
     return mesh.interfaces[0], pad_stiffnesses(specimen, mesh)

@@ -44,8 +44,8 @@ ROOT = HERE.parent.parent
 LIST = YAML(typ="safe").load(HERE.with_suffix(".yaml"))
 RUNS: dict[str, dict[str, Any]] = LIST["runs"]
 
-# What was renamed on purpose: a pattern found in "run/file > field" of the earlier side, and what
-# the later side has in its place (as re.sub takes them); texts are compared in the new words too.
+# Intended renamings: a pattern found in "run/file > field" of the earlier side, and its replacement
+# on the later side (as for re.sub). Texts are compared after the same replacements.
 # Since 838e474:
 RENAMED: tuple[tuple[str, str], ...] = (
     (r"\bwear\.stint\.share\b", "wear.step.fraction"),
@@ -54,7 +54,7 @@ RENAMED: tuple[tuple[str, str], ...] = (
     (r"\bstint_limit\b", "stable_cycles"),
     (r"(loads\.\d+)\.stints\b", r"\1.cycle_blocks"),
 )
-# What the later side adds on purpose: the list of the files of a run, and the kind of its case.
+# Intended additions on the later side: the list of the files of a run, and the kind of its case.
 ADDED = re.compile(r"manifest\.json|results\.h5 > @kind")
 
 # Relative to the largest value of a field: sums in another order differ by some 1e-12.
@@ -80,7 +80,7 @@ BOXES: dict[str, tuple[tuple[float, ...], dict[str, float]]] = {
 
 
 class Recorder:
-    """The command of a checkout, and the folder that it writes to."""
+    """Command of a checkout, and the folder that it writes to."""
 
     def __init__(self, folder: Path, checkout: Path) -> None:
         self.folder, self.checkout = folder.resolve(), checkout.resolve()
@@ -108,7 +108,7 @@ class Recorder:
         )
 
     def write_inputs(self) -> None:
-        """Write what the runs read beside the shipped cases."""
+        """Write the files that the runs read in addition to the shipped cases."""
         self.inputs.mkdir(parents=True)
         for kind in ("mesh", "resultants"):
             self.fretscale("new", kind, str(self.inputs / f"{kind}.yaml"))
@@ -121,7 +121,7 @@ class Recorder:
         np.savetxt(self.inputs / "measured.csv", loop, delimiter=",", header=header, comments="")
 
     def run(self, name: str) -> None:
-        """Run a case into ``NAME/out``, with its ``NAME/exit_code``, unless that is there."""
+        """Run a case into ``NAME/out``, with its ``NAME/exit_code``, unless that exists."""
         folder = self.folder / name
         if (folder / "exit_code").exists():
             return
@@ -138,7 +138,7 @@ class Recorder:
 
 
 def write_boxes(folder: Path) -> None:
-    """Both boxes as ``joint.msh`` and ``joint.brep``."""
+    """Write both boxes as ``joint.msh`` and ``joint.brep``."""
     gmsh.initialize(interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
     for body, (box, heights) in BOXES.items():
@@ -158,19 +158,19 @@ def write_boxes(folder: Path) -> None:
 
 
 def record(folder: Path, checkout: Path, runs: Sequence[str], jobs: int) -> None:
-    """Run the cases of ``checkout``; what an interrupted record has left is kept."""
+    """Run the cases of ``checkout``; results of an interrupted record are reused."""
     recorder = Recorder(folder, checkout)
     with ThreadPoolExecutor(jobs) as pool:
         list(pool.map(recorder.run, runs))
 
 
-# --- what a run left ------------------------------------------------------------------------------
+# --- files of a run -------------------------------------------------------------------------------
 
 Value = np.ndarray | str
 
 
 def fields(folder: Path, name: str) -> dict[str, Value]:
-    """All that the run ``name`` left that is compared, by "run/file > field"."""
+    """Return all compared values of the run ``name``, by "run/file > field"."""
     places = (folder / PLACES).read_text("utf-8").split()
     values: dict[str, Value] = {
         f"{name} > exit code": (folder / name / "exit_code").read_text("utf-8")
@@ -188,7 +188,7 @@ def fields(folder: Path, name: str) -> dict[str, Value]:
 
 
 def read(path: Path) -> Iterator[tuple[str, Value]]:
-    """Names and values of the fields of a file."""
+    """Yield names and values of the fields of a file."""
     if OPAQUE.search(path.name):
         return iter(())
     if reader := READERS.get(path.suffix):
@@ -205,7 +205,7 @@ def read_yaml(path: Path) -> Iterator[tuple[str, Value]]:
 
 
 def flat(value: Any, name: str = "") -> Iterator[tuple[str, Value]]:
-    """Entries of nested dictionaries and lists; lists of numbers are one entry."""
+    """Yield entries of nested dictionaries and lists; a list of numbers is one entry."""
     if isinstance(value, dict) or (isinstance(value, list) and not is_numeric(value)):
         items = value.items() if isinstance(value, dict) else enumerate(value)
         for key, entry in items:
@@ -215,7 +215,7 @@ def flat(value: Any, name: str = "") -> Iterator[tuple[str, Value]]:
 
 
 def is_numeric(value: object) -> bool:
-    """Whether an array of numbers can be made of ``value``."""
+    """Return whether ``value`` can be converted to an array of numbers."""
     try:
         return np.asarray(value).dtype.kind in "biufc"
     except ValueError:
@@ -223,14 +223,14 @@ def is_numeric(value: object) -> bool:
 
 
 def as_value(value: object) -> Value:
-    """A number or an array of them, or a text."""
+    """Return a number or an array of numbers, or a text."""
     if is_numeric(value):
         return np.asarray(value)
     return str(value.tolist() if isinstance(value, np.ndarray) else value)
 
 
 def read_h5(path: Path) -> Iterator[tuple[str, Value]]:
-    """Datasets as ``group/name`` and attributes as ``group/name@attribute``."""
+    """Yield datasets as ``group/name`` and attributes as ``group/name@attribute``."""
     with h5py.File(path) as file:
         items: list[tuple[str, Any]] = [("", file)]
         file.visititems(lambda name, item: items.append((name, item)))
@@ -243,7 +243,7 @@ def read_h5(path: Path) -> Iterator[tuple[str, Value]]:
 
 
 def read_csv(path: Path) -> Iterator[tuple[str, Value]]:
-    """Columns by their headings; what begins with # is a text of its own."""
+    """Yield columns by their headings; a line that begins with # is a separate text."""
     lines = path.read_text("utf-8").splitlines()
     yield "comments", "\n".join(line for line in lines if line.startswith("#"))
     header, *rows = csv.reader(line for line in lines if not line.startswith("#"))
@@ -287,7 +287,7 @@ Deviation = float | str
 
 
 def compare(earlier: Path, later: Path, runs: Sequence[str], tolerance: float, every: bool) -> bool:
-    """Print a line for each run and for each thing that differs; whether nothing does."""
+    """Print a line for each run and each difference; return whether there is none."""
     equal = True
     for name in runs:
         there = [(folder / name / "exit_code").exists() for folder in (earlier, later)]
@@ -302,7 +302,7 @@ def compare(earlier: Path, later: Path, runs: Sequence[str], tolerance: float, e
 def compare_run(
     before: dict[str, Value], after: dict[str, Value], name: str, tolerance: float, every: bool
 ) -> bool:
-    """Print how the fields of a run compare; whether they agree."""
+    """Print how the fields of a run compare; return whether they agree."""
     before = {renamed(key): value for key, value in before.items()}
     lines = [f"missing: {key}" for key in outermost(before.keys() - after.keys())]
     added = {key for key in after.keys() - before.keys() if not ADDED.search(key)}
@@ -328,21 +328,21 @@ def compare_run(
 
 
 def outermost(keys: set[str]) -> set[str]:
-    """Those of which neither the file nor the dataset is among them."""
+    """Return the keys whose file and dataset are not among the keys themselves."""
     return {
         key for key in keys if keys.isdisjoint({key.split(" > ")[0], key.split("@")[0]} - {key})
     }
 
 
 def renamed(key: str) -> str:
-    """The name on the later side."""
+    """Return the name on the later side."""
     for pattern, replacement in RENAMED:
         key = re.sub(pattern, replacement, key)
     return key
 
 
 def deviation(key: str, before: Value, after: Value) -> Deviation:
-    """Largest difference over the largest value, or in words what is different."""
+    """Return the largest difference over the largest value, or a description of the difference."""
     if isinstance(before, str) or isinstance(after, str):
         same = isinstance(before, str) and isinstance(after, str) and renamed(before) == after
         return 0.0 if same else f"was {str(before)[:60]!r}, is {str(after)[:60]!r}"
@@ -367,7 +367,7 @@ def deviation(key: str, before: Value, after: Value) -> Deviation:
 
 
 def main() -> int:
-    """Read the command and do it."""
+    """Parse the command line and run the command."""
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument("--quick", action="store_true", help="one small case of each kind")
     common.add_argument("--only", action="append", metavar="NAME", help="this case; repeatable")
@@ -408,7 +408,7 @@ def main() -> int:
 
 
 def record_revision(folder: Path, revision: str, runs: Sequence[str], jobs: int) -> None:
-    """Record a revision in a work tree of its own, by its own list of runs where it has one."""
+    """Record a revision in a separate work tree, with its own list of runs if it has one."""
     tree = folder.with_name("checkout")
     worktree = ["git", "-C", str(ROOT), "worktree"]
     subprocess.run([*worktree, "add", "--quiet", "--detach", str(tree), revision], check=True)

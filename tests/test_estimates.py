@@ -1,4 +1,4 @@
-"""Estimates of error that no other test holds against the truth: see docs/estimates.md."""
+"""Error estimates that no other test compares with the true error: see docs/estimates.md."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ from workflow.shell.convergence import richardson
 
 @pytest.mark.parametrize("per_period", [20, 60])
 def test_the_error_of_steps_in_time_is_that_of_the_whole_motion(per_period):
-    """A free mass on a spring, whose period is longer by (ωh)²/12, and on from where it is left."""
+    """A free mass on a spring has a period longer by (ωh)²/12, also after a resumption."""
     rig = lumped_rig({"a": 2e-3}, {Link("a"): 400.0}, [[Link("a")]], 0.0)
     circular = np.sqrt(400.0 / 2e-3)
     period = 2.0 * np.pi / circular
@@ -40,9 +40,9 @@ def test_the_error_of_steps_in_time_is_that_of_the_whole_motion(per_period):
 @pytest.mark.parametrize("tolerance", [None, 1e-5])
 @pytest.mark.parametrize(("force", "step"), [("blow", 2e-5), ("blow", 4e-5), ("shaken", 1e-4)])
 def test_with_friction_too(force, step, tolerance):
-    """Two masses on a slider, hit or shaken, against the same from event to event.
+    """Two masses on a slider, hit or shaken, are compared with event-driven integration.
 
-    Friction excites their second mode, 16 and more steps long, which is soon out of phase.
+    Friction excites their second mode, 16 or more steps long, which is soon out of phase.
     """
     rig, driven = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3), 1e-3), np.array([1.0, 0.0])
     forces = {"blow": HammerBlow(driven, 100.0, 4e-4), "shaken": HarmonicForce(driven, 75.0, 100.0)}
@@ -68,7 +68,7 @@ def test_the_error_of_a_single_step_is_its_own():
 
 @pytest.mark.parametrize("room", [1.25, 1.4, 1.6])
 def test_ladders_of_grids_say_how_far_hertz_is(room):
-    """Of the pressure in the middle, within a factor of three, however the contact lies."""
+    """The error of the central pressure is found within a factor of three for any position."""
     material = Material(115e3, 0.29)
     pair = ElasticPair(material, material)
     hertz = HertzSphere(100.0, 10.0, pair.contact_modulus)
@@ -90,7 +90,7 @@ def test_ladders_of_grids_say_how_far_hertz_is(room):
 @pytest.mark.slow
 @pytest.mark.parametrize("curved", [False, True])
 def test_the_coupled_cycle_says_what_the_uncoupled_one_leaves(curved):
-    """Of the energy at 250 N, with the increments of a run and with six times as many."""
+    """The energy at 250 N is compared, with the increments of a run and six times as many."""
     face, stiffness = coarse_pads()
     pair = ReducedPair.from_stiffness(face, *stiffness)
     gap = face.gap if curved else np.zeros(len(face))
@@ -108,7 +108,7 @@ def test_the_coupled_cycle_says_what_the_uncoupled_one_leaves(curved):
 
 @pytest.mark.slow
 def test_steady_states_of_an_ageing_rig_are_as_many_as_it_takes(tmp_path):
-    """What is told is what they leave, within a factor of three."""
+    """The reported error is the actual one within a factor of three."""
     stiffer = "\nevolution: {stiffness: {kind: arrhenius, change: 3, scale: 40 J}}\n"
     loud = "excitation.force=150 N", "excitation.steady=1e-6", "excitation.periods=400"
     few, many = (

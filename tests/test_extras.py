@@ -1,7 +1,7 @@
-"""Each extra of pyproject.toml, installed alone beside what running needs, does its job there.
+"""Each extra of pyproject.toml suffices for its purpose when it is installed alone.
 
-The package is built and installed as a user has it, not as this checkout. Every environment begins
-as a copy (by links) of one that has nothing but what running needs.
+The package is built and installed as by a user, not used from this checkout. Every environment
+starts as a copy (by links) of one with only the packages needed to run.
 """
 
 import os
@@ -67,7 +67,7 @@ JOBS = {
 
 
 def python(folder: Path, *arguments: str, cwd: Path | None = None) -> str:
-    """Run the Python of an environment in a shell that sets nothing, and return what it prints."""
+    """Run the Python of an environment in a shell without settings, and return its output."""
     kept = {name: value for name, value in os.environ.items() if name.startswith(OF_PIP)}
     kept |= {"PATH": os.environ["PATH"], "HOME": os.environ["HOME"], "LANG": "C.UTF-8"}
     command = [str(folder / "bin" / "python"), *arguments]
@@ -84,7 +84,7 @@ def install(folder: Path, *what: str) -> None:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The package, built from a copy: a build leaves files in its folder."""
+    """Build the package from a copy, because a build leaves files in its folder."""
     place = tmp_path_factory.mktemp("wheel")
     for name in SOURCES:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
@@ -98,7 +98,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment with what running needs and no more."""
+    """Return an environment with only the packages needed to run."""
     folder = tmp_path_factory.mktemp("bare") / "env"
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     install(folder, str(wheel))

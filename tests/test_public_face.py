@@ -1,4 +1,4 @@
-"""What the library shows of itself, and what it needs to be installed."""
+"""Tests of the public names of the libraries and of their dependencies."""
 
 import ast
 import dataclasses
@@ -47,7 +47,7 @@ for package in map(importlib.import_module, {packages}):
 
 @pytest.mark.parametrize("package", [["sa_solver"], ["sa_solver", "wear"]], ids=lambda p: p[-1])
 def test_all_modules_import_with_the_numerical_libraries_alone(package):
-    """As after ``pip install numpy scipy numba pyfftw``: everything else is refused."""
+    """Importing anything beyond ``pip install numpy scipy numba pyfftw`` is refused."""
     code = REFUSING.format(allowed=INSTALLED | set(package), packages=package)
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
@@ -91,7 +91,7 @@ def test_the_example_of_a_package_runs(name, monkeypatch):
 
 
 def _public_objects(name: str) -> dict[str, object]:
-    """Functions and classes of a package, exceptions apart."""
+    """Return functions and classes of a package, except exceptions."""
     package = importlib.import_module(name)
     objects = {public: getattr(package, public) for public in package.__all__}
     return {
@@ -115,7 +115,7 @@ def test_examples_of_functions_and_classes_run(name, monkeypatch):
 
 @pytest.mark.parametrize("name", FACES)
 def test_texts_of_public_classes_speak_of_every_field(name):
-    """The pages show a signature and this text: shapes and units are nowhere else."""
+    """The pages show only a signature and this text, so shapes and units must be here."""
     for public, value in _public_objects(name).items():
         fields = dataclasses.fields(value) if dataclasses.is_dataclass(value) else ()
         texts = [base.__doc__ or "" for base in value.__mro__] if fields else []

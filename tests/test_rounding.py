@@ -1,4 +1,4 @@
-"""The tests of solvers again, rounded as by another processor, and with perturbed matrices."""
+"""Tests of solvers, repeated with another processor's rounding and perturbed matrices."""
 
 import os
 import subprocess
@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-# What an x86 processor of 2008 would do: no fused products, other sums, other elementary functions.
-# Elsewhere these do nothing, or change what they can.
+# Settings of an x86 processor of 2008: no fused products, other sums, other elementary functions.
+# On other processors they have no effect, or a partial one.
 OLD_PROCESSOR = {
     "OPENBLAS_CORETYPE": "Prescott",
     "MKL_CBWR": "COMPATIBLE",
@@ -25,9 +25,9 @@ def modules(package, *names):
     return [f"tests/{package}/test_{name}.py" for name in names]
 
 
-# Where comparisons of rounded numbers decide: what touches, sticks or has converged, which of equal
-# things is told, when a step ends. Elsewhere rounding stays rounding. The compiled joints and the
-# branches of vibrations would double the time.
+# Tests in which comparisons of rounded numbers decide: what touches, sticks or has converged, which
+# of equal values is reported, when a step ends. In other tests rounding has no further effect. The
+# compiled joints and the branches of vibrations would double the time.
 CONTACTS = [
     *modules("sa_solver", "contact", "coupled", "coupled_failures", "friction_limit"),
     *modules("sa_solver", "gross_slip", "history"),
@@ -45,7 +45,7 @@ SPECIMENS = modules("workflow", "pad_half_space", "specimens_case")
 
 
 def run_tests(*arguments, **environment):
-    """Run pytest by itself; what fails is shown."""
+    """Run pytest in a separate process, and show its failures."""
     words = [sys.executable, "-m", "pytest", "-q", "--tb=short", "-p", "no:cacheprovider"]
     done = subprocess.run(
         [*words, *arguments],
@@ -66,5 +66,5 @@ def test_solvers_do_not_notice_perturbed_matrices():
 @pytest.mark.slow
 @pytest.mark.long
 def test_solvers_do_not_notice_another_processor(tmp_path):
-    # What is compiled for it is kept apart.
+    # Code compiled for it goes to a separate cache.
     run_tests(*CONTACTS, *WEAR, *SPECIMENS, **OLD_PROCESSOR, NUMBA_CACHE_DIR=str(tmp_path))

@@ -1,4 +1,4 @@
-"""Rings, and sectors of them: in the plane about Y, in space about any axis."""
+"""Rings and sectors of them: in the plane about Y, in space about any axis."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from fe_models.meshes.structure_mesh import Body, named_mesh
 
 INNER, OUTER, WIDTH = 20.0, 30.0, 6.0
 Y = np.array([0.0, 1.0, 0.0])
-# Of an axis that is none of the global ones.
+# Direction of an axis that is not a global one.
 OBLIQUE = np.array([1.0, 2.0, -0.5])
 THROUGH = np.array([3.0, -2.0, 5.0])
 
 
 def about(axis=Y, through=(0.0, 0.0, 0.0), sectors=6, low=("low",), high=("high",)):
-    """The cuts of a sector."""
+    """Return the cuts of a sector."""
     return Cyclic(low, high, np.array(axis, float), np.array(through, float), sectors)
 
 
 def sector(sectors, counts=(4, 5, 2), dimension=2, inner=INNER, axis=Y, through=None, moved=0.0):
-    """A sector whose inside nodes are shifted, so that it has no symmetry of its own.
+    """Return a sector whose inner nodes are shifted, so that it has no symmetry.
 
     ``counts`` are elements along the radius, round the sector and along the axis. Boundaries: low,
     high, bore, rim, a pad on the rim that ends within it, in space also front and back. Nodes of
-    the high cut are ``moved`` along it by up to so much of an element, and match no more.
+    the high cut are ``moved`` along it by up to this share of an element, and then do not match.
     """
     radial, round_, deep = counts
     r, t = np.linspace(inner, OUTER, radial + 1), np.linspace(0.0, 1.0, round_ + 1)
@@ -56,7 +56,7 @@ def sector(sectors, counts=(4, 5, 2), dimension=2, inner=INNER, axis=Y, through=
 
 
 def curved(body):
-    """The body with edges that go round its axis, Y, as circles do."""
+    """Return the body with edges around its axis, Y, that are circular."""
     mesh = body.mesh
     ends = body.points[(mesh.edges if mesh.dim() == 3 else mesh.facets).T]
     depth, arms = ends[..., 1].mean(axis=1), ends * np.array([1.0, 0.0, 1.0])
@@ -68,7 +68,7 @@ def curved(body):
 
 
 def shoe(sectors, counts=(4, 5, 2), dimension=2):
-    """A body on the pad of a sector, about Y, with boundaries pad and top."""
+    """Return a body on the pad of a sector, about Y, with boundaries pad and top."""
     _, round_, deep = counts
     r, t = OUTER + np.array([0.0, 3.0, 6.0]), np.arange(1, round_ - 1) / round_
     y = np.linspace(0.0, WIDTH, deep + 1) if dimension == 3 else np.zeros(1)
@@ -82,7 +82,7 @@ def shoe(sectors, counts=(4, 5, 2), dimension=2):
 
 
 def turned(body, cyclic, count):
-    """A body in another sector, called after it, with its boundaries named after it too."""
+    """Return a body in another sector, with that sector's number in its names."""
     images = (body.points - cyclic.through) @ cyclic.turn(count).T + cyclic.through
     names = {f"{name}_{count}": facets for name, facets in body.mesh.boundaries.items()}
     mesh = type(body.mesh)(np.ascontiguousarray(images[:, body.axes].T), body.mesh.t)
@@ -90,7 +90,7 @@ def turned(body, cyclic, count):
 
 
 def wheel(part, cyclic, faces=("pad",)):
-    """The whole wheel of a sector, with its boundaries but the cuts, and ``faces`` one by one."""
+    """Return the whole wheel of a sector, without the cuts and with separate ``faces``."""
     mesh, count = part.mesh, part.mesh.nvertices
     turns = [cyclic.turn(k) for k in range(cyclic.sectors)]
     points = np.concatenate(
@@ -110,7 +110,7 @@ def wheel(part, cyclic, faces=("pad",)):
 
 
 def _merged(name, points, cells, named, dimension):
-    """Nodes of one place are one."""
+    """Merge nodes at the same place."""
     tree = cKDTree(points)
     first = np.array([min(near) for near in tree.query_ball_point(points, 1e-8)])
     kept, place = np.unique(first, return_inverse=True)
@@ -127,7 +127,7 @@ def _merged(name, points, cells, named, dimension):
 
 
 def _cells(number):
-    """Simplices of a grid of nodes, with one diagonal in all cells."""
+    """Return simplices of a grid of nodes, with the same diagonal in all cells."""
     if number.shape[2] == 1:
         n = number[:, :, 0]
         a, b, c, d = n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]
@@ -145,7 +145,7 @@ def _cells(number):
 
 
 def _boundaries(number, cells):
-    """Facets of the grid's sides, by the nodes on them."""
+    """Return facets of the grid's sides, by the nodes on them."""
     faces = np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])])
     faces = np.unique(np.sort(faces, axis=1), axis=0)
     last = number.shape[1] - 1
@@ -162,7 +162,7 @@ def _boundaries(number, cells):
 
 
 def _frame(axis):
-    """Rows are X, Y, Z turned so that Y is along an axis."""
+    """Return X, Y, Z as rows, turned so that Y is along an axis."""
     y = np.asarray(axis, float) / np.linalg.norm(axis)
     if np.allclose(y, Y):
         return np.eye(3)

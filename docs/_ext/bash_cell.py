@@ -1,6 +1,6 @@
-"""Cells of shell commands whose output comes in one piece; IPython runs this as it starts.
+"""Notebook cells of shell commands with their output in one piece; IPython runs this at its start.
 
-IPython's own passes it on as it comes, and lines that come in two pieces end up as two.
+IPython's built-in cell passes output on as it arrives, and splits lines that arrive in two pieces.
 """
 
 import subprocess
@@ -9,7 +9,7 @@ from IPython import get_ipython
 
 
 def bash(line: str, cell: str) -> None:
-    """Run a cell by bash; a command that fails ends it, and the page."""
+    """Run a cell in bash; a command that fails ends the cell and the page."""
     done = subprocess.run(
         ["bash", "-ec", cell],
         stdout=subprocess.PIPE,

@@ -1,8 +1,8 @@
-"""The reference of case entries, made from the models of the cases when the pages are built.
+"""Reference of case entries, generated from the models of the cases when the pages are built.
 
-A page for every kind of case. Entries stand under the section that they belong to, and under each
-kind of it where there are several: path, meaning with its base unit, what is allowed, default and
-example. Nothing of it is written by hand: a new entry is on its page with the next build.
+There is a page for every kind of case. Entries are listed under their section, and under each
+variant of a section that has several: path, meaning with base unit, allowed values, default and
+example. Nothing is written by hand: a new entry appears on its page with the next build.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from workflow.kinds import kinds
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-DEEPEST = 4  # heading; sections below have their entries beneath it
+DEEPEST = 4  # level of headings; deeper sections list their entries under the last one
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Write the pages before Sphinx looks for sources."""
+    """Register the writing of the pages before Sphinx looks for sources."""
     app.connect("builder-inited", lambda app: write_pages(Path(app.srcdir) / "reference" / "cases"))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def write_pages(folder: Path) -> None:
-    """A page for every kind of case; those that are as they were keep their time."""
+    """Write a page for every kind of case; unchanged pages keep their modification time."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, model in kinds().items():
         page, text = folder / f"{name}.md", case_page(name, model)
@@ -41,14 +41,14 @@ def write_pages(folder: Path) -> None:
 
 
 def case_page(name: str, model: type[Case]) -> str:
-    """The page of one kind of case, in MyST."""
+    """Return the page of one kind of case, in MyST."""
     words = " ".join((model.__doc__ or "").split())
     head = [f"# `{name}`", words, f"A commented case: `fretscale new {name} my.yaml`."]
     return "\n\n".join([*head, *section_blocks(model, "", 2)]) + "\n"
 
 
 def section_blocks(model: type[Section], path: str, level: int) -> Iterator[str]:
-    """The entries of a section and of those in it, as blocks of text."""
+    """Yield the entries of a section and its subsections as blocks of text."""
     inner = []
     for name, field in entries_of(model).items():
         full = f"{path}.{name}" if path else name
@@ -61,7 +61,7 @@ def section_blocks(model: type[Section], path: str, level: int) -> Iterator[str]
 
 
 def subsection_blocks(path: str, field: FieldInfo, level: int) -> Iterator[str]:
-    """A section within another, once for each of its kinds."""
+    """Yield a subsection, once for each of its variants."""
     models, marks = list(sections_of(field.annotation)), "#" * min(level, DEEPEST)
     many = "[]" if is_list(field.annotation) else ""
     yield f"{marks} `{path}{many}`"
@@ -74,7 +74,7 @@ def subsection_blocks(path: str, field: FieldInfo, level: int) -> Iterator[str]:
 
 
 def section_notes(field: FieldInfo) -> Iterator[str]:
-    """What is to be said of a section beside its entries."""
+    """Yield the notes on a section as a whole."""
     if entry := entry_of(field):
         yield f"Or {plain(entry.allowed)}."
     if words := list(words_in(field.annotation)):
@@ -84,20 +84,20 @@ def section_notes(field: FieldInfo) -> Iterator[str]:
 
 
 def distinguished(model: type[Section]) -> str:
-    """What chooses this kind of a section."""
+    """Return which entry selects this variant of a section."""
     named = [name for name in KINDS_ARE_NAMED_BY if name in model.model_fields]
     chosen = [f"`{name}: {word}`" for name in named for word in _word(model, name)]
     return " and ".join(chosen) or f"entries of {model.__name__}"
 
 
 def _word(model: type[Section], name: str) -> tuple[str, ...]:
-    """The one word that a kind of section has for ``name``; none where it leaves a choice."""
+    """Return the only allowed word of entry ``name`` in this variant; none if it has a choice."""
     words = get_args(model.model_fields[name].annotation)
     return words if len(words) == 1 else ()
 
 
 def leaf(path: str, field: FieldInfo) -> str:
-    """One entry, as an item of a definition list."""
+    """Return one entry as an item of a definition list."""
     notes = [
         f"Allowed: {allowed(field)}." if allowed(field) else "",
         default(field),
@@ -108,7 +108,7 @@ def leaf(path: str, field: FieldInfo) -> str:
 
 
 def allowed(field: FieldInfo) -> str:
-    """What an entry takes."""
+    """Return the allowed values of an entry."""
     annotation, entry = field.annotation, entry_of(field)
     words = ", ".join(f"`{word}`" for word in words_in(annotation))
     if annotation is bool:
@@ -119,7 +119,7 @@ def allowed(field: FieldInfo) -> str:
 
 
 def default(field: FieldInfo) -> str:
-    """What holds where an entry is not given."""
+    """Return the value of an entry that is not given."""
     if field.is_required():
         return "Must be given."
     value = field.get_default(call_default_factory=True)
@@ -129,14 +129,14 @@ def default(field: FieldInfo) -> str:
 
 
 def example(field: FieldInfo) -> str:
-    """An entry as one would write it; a choice needs none."""
+    """Return an example of an entry; entries with a choice of words need none."""
     if not field.examples or not entry_of(field):
         return ""
     return f"Example: `{written(field.examples[0])}`."
 
 
 def words_in(annotation: object) -> Iterator[str]:
-    """The words of fixed choices in an annotation, wherever in it but in sections."""
+    """Yield the words of fixed choices in an annotation, at any depth except in sections."""
     if get_origin(annotation) is Literal:
         yield from (written(word) for word in get_args(annotation))
     else:
@@ -145,24 +145,24 @@ def words_in(annotation: object) -> Iterator[str]:
 
 
 def is_list(annotation: object) -> bool:
-    """Whether an entry is a list, if it is given at all."""
+    """Return whether an entry is a list, if it is given."""
     return get_origin(annotation) is tuple or any(is_list(a) for a in get_args(annotation))
 
 
 def written(value: Any) -> str:
-    """A value as in a case file."""
+    """Return a value as a case file has it."""
     if isinstance(value, str):
         return value
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
 def sentence(text: str | None) -> str:
-    """A description of a model; words of a case in it keep their small letters."""
+    """Return a description of a model as a sentence; words of a case in it keep their case."""
     return f"{plain(text or '')}."
 
 
 def plain(text: str) -> str:
-    """Text that Markdown takes as it is written."""
+    """Return a text escaped so that Markdown shows it unchanged."""
     for sign in "\\*_<>$[]|":
         text = text.replace(sign, f"\\{sign}")
     return text

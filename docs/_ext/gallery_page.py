@@ -1,7 +1,7 @@
-"""The page of the gallery, made from the shipped cases when the pages are built.
+"""Page of the gallery, generated from the shipped cases when the pages are built.
 
-Of each case its title, what it shows, the command, how long `check` says that it takes, and what
-its expectations are held against.
+It shows each case with its title, description, command, run time estimated by `check`, and the
+sources of its expected values.
 """
 
 from __future__ import annotations
@@ -60,13 +60,13 @@ check` tells of one core."""
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Write the page before Sphinx looks for sources."""
+    """Register the writing of the page before Sphinx looks for sources."""
     app.connect("builder-inited", lambda app: write_page(Path(app.srcdir) / "gallery"))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def write_page(folder: Path) -> None:
-    """The page, if it is not as it was."""
+    """Write the page if it has changed."""
     page, text = folder / "index.md", "\n\n".join(_blocks(folder)) + "\n"
     if not page.exists() or page.read_text(encoding="utf-8") != text:
         page.write_text(text, encoding="utf-8")
@@ -94,7 +94,7 @@ def _case_blocks(name: str, scene: str, folder: Path) -> Iterator[str]:
 
 
 def _held_against(case: Case) -> Iterator[str]:
-    """The kinds of its expectations with their sources, each once; formulas are code."""
+    """Yield the kinds of the expectations with their sources, each once; formulas become code."""
     for kind in ("printed", "closed_form", "independent", "earlier"):
         sources = dict.fromkeys(entry.source for entry in case.expect if entry.kind == kind)
         if sources:

@@ -1,8 +1,8 @@
-"""The reference of the libraries, made from their public names when the pages are built.
+"""Reference of the libraries, generated from their public names when the pages are built.
 
-A page for every library. What a package offers (its ``__all__``) stands in the groups and the order
-of its own text; then what these take and give back beside that. Signatures have the types as they
-are written in the source. Nothing of it is written by hand.
+There is a page for every library. The public names of a package (its ``__all__``) appear in the
+groups and the order of its docstring, followed by further classes that they take or return.
+Signatures have the types as they are written in the source. Nothing is written by hand.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
     from sphinx.environment import BuildEnvironment
 
-# The packages of each page, and what they are about.
+# The packages of each page, with their subjects.
 LIBRARIES = {
     "sa_solver": {"sa_solver": "contact mechanics"},
     "wear": {
@@ -43,16 +43,16 @@ LIBRARIES = {
 }
 PAGES = "reference/libraries/"
 NAME = re.compile(r"[A-Za-z_]\w*")
-# A group of the text of a package, and the names that begin its items.
+# Patterns of a group in the docstring of a package, and of the names that begin its items.
 GROUP = re.compile(r"^(?P<title>[A-Z].*)\n(?=    - ``)", re.MULTILINE)
 ITEM = re.compile(r"^ *- (?P<names>``\w+``(?:,\s+``\w+``)*)", re.MULTILINE)
-# A default that has no text of its own.
+# Pattern of a default value whose representation is not source code.
 NAMELESS = re.compile(r"<[^<>]*(?:<[^<>]*>[^<>]*)*>")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Write the pages before Sphinx looks for sources, and help it with their signatures."""
-    # Names of `autodoc_type_aliases` within other types are shown by this.
+    """Register the writing of the pages, before Sphinx looks for sources, and text processing."""
+    # Sphinx shows the names of `autodoc_type_aliases` within other types by their repr.
     TypeAliasForwardRef.__repr__ = lambda self: self.name
     app.connect("builder-inited", lambda app: write_pages(Path(app.srcdir) / "reference"))
     app.connect("autodoc-process-signature", as_written)
@@ -68,7 +68,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def write_pages(folder: Path) -> None:
-    """A page for every library; those that are as they were keep their time."""
+    """Write a page for every library; unchanged pages keep their modification time."""
     folder = folder / "libraries"
     folder.mkdir(parents=True, exist_ok=True)
     for library, packages in LIBRARIES.items():
@@ -78,7 +78,7 @@ def write_pages(folder: Path) -> None:
 
 
 def _blocks(packages: dict[str, str]) -> Iterator[str]:
-    """A page, the first of its packages being what it is about; every class has one place."""
+    """Yield the blocks of a page, which is about its first package; every class appears once."""
     lines, placed = "=-~", set[type]()
     for number, (name, about) in enumerate(packages.items()):
         package, below = import_module(name), lines[min(number, 1) :]
@@ -104,13 +104,13 @@ def _heading(title: str, line: str) -> str:
 
 
 def _directive(path: str) -> str:
-    """What documents a public name, with its members and those that it has from others of ours."""
+    """Return the directive that documents a public name with all its members."""
     module, _, name = path.rpartition(".")
     value = getattr(import_module(module), name)
     if not isinstance(value, type):
         return f".. autofunction:: {path}"
     if issubclass(value, BaseException):
-        # The same error is offered, and has its place, where cases are run from Python.
+        # An error that `fretscale` exports as well is indexed on the page of that package.
         elsewhere = "\n   :no-index:" if getattr(fretscale, name, None) is value else ""
         return f".. autoexception:: {path}\n   :no-members:{elsewhere}"
     called = "\n   :special-members: __call__" if "__call__" in vars(value) else ""
@@ -118,7 +118,7 @@ def _directive(path: str) -> str:
 
 
 def groups(package: ModuleType) -> list[tuple[str, list[str]]]:
-    """Public names in the groups of the package's own text, each with its title, empty if none."""
+    """Return the public names by the groups of the package's docstring; a title may be empty."""
     text = package.__doc__ or ""
     starts = [(match.start(), match["title"]) for match in GROUP.finditer(text)] or [(0, "")]
     ends = [start for start, _ in starts[1:]] + [len(text)]
@@ -138,11 +138,11 @@ def groups(package: ModuleType) -> list[tuple[str, list[str]]]:
     return found
 
 
-# --- what else is taken and given back ----------------------------------------------------------
+# --- further classes that are taken and returned ------------------------------------------------
 
 
 def others(package: ModuleType) -> set[type]:
-    """Classes of ours that public ones take, have or give back, and that have no public name."""
+    """Return the non-public classes of the library that public names take, contain or return."""
     library, public = package.__name__.partition(".")[0], _public()
     kept: dict[str, list[type]] = {}
     for cls in _classes(library):
@@ -165,7 +165,7 @@ def _public() -> set[object]:
 
 
 def _classes(library: str) -> Iterator[type]:
-    """All classes of a library, where they are defined."""
+    """Yield all classes of a library, where they are defined."""
     for module in _modules(library):
         for value in vars(module).values():
             if isinstance(value, type) and value.__module__ == module.__name__:
@@ -179,7 +179,7 @@ def _modules(library: str) -> Iterator[ModuleType]:
 
 
 def _annotations(value: object) -> Iterator[str]:
-    """Those of a function, or of the fields and documented methods of a class."""
+    """Yield the annotations of a function, or of the fields and documented methods of a class."""
     if not isinstance(value, type):
         yield from map(str, getattr(value, "__annotations__", {}).values())
         return
@@ -193,7 +193,7 @@ def _annotations(value: object) -> Iterator[str]:
 
 
 def _function(member: object) -> Any:
-    """The function behind a method or a property."""
+    """Return the function behind a method or a property."""
     if isinstance(member, property):
         return member.fget
     if isinstance(member, cached_property):
@@ -207,11 +207,11 @@ def _function(member: object) -> Any:
 def as_written(
     app: Sphinx, what: str, name: str, value: Any, options: Any, signature: str, returns: str
 ) -> tuple[str, str] | None:
-    """The signature with annotations and defaults as they are in the source."""
+    """Return the signature with annotations and defaults as they are in the source."""
     if what not in ("class", "function", "method") or not callable(value):
         return None
     if getattr(value, "_is_protocol", False):
-        return "", ""  # nobody makes one
+        return "", ""  # a protocol is never instantiated
     found, module = inspect.signature(value), value.__module__
     parameters = list(found.parameters.values())
     if what == "method" and parameters and parameters[0].name in ("self", "cls"):
@@ -221,7 +221,7 @@ def as_written(
 
 
 def _parameters(parameters: Sequence[inspect.Parameter], module: str) -> Iterator[str]:
-    """Each as one would write it."""
+    """Yield each parameter as source code."""
     named_only = False
     for parameter in parameters:
         if parameter.kind is parameter.KEYWORD_ONLY and not named_only:
@@ -235,7 +235,7 @@ def _parameters(parameters: Sequence[inspect.Parameter], module: str) -> Iterato
 
 
 def _linked(annotation: object, module: str) -> str:
-    """An annotation of a module with the full names of classes that are documented."""
+    """Return an annotation of a module with the full names of documented classes."""
     if annotation is inspect.Signature.empty:
         return ""
     if not isinstance(annotation, str):
@@ -244,7 +244,7 @@ def _linked(annotation: object, module: str) -> str:
 
 
 def _path(name: str, module: str) -> str:
-    """Where a class of this name, known to a module or its library, is documented."""
+    """Return where a class of this name, known to a module or its library, is documented."""
     known = vars(import_module(module)).get(name)
     library = module.partition(".")[0]
     for cls, path in _documented().items():
@@ -256,7 +256,7 @@ def _path(name: str, module: str) -> str:
 
 @cache
 def _documented() -> dict[type, str]:
-    """The classes that have a place on the pages, by their names there."""
+    """Return the classes that have a place on the pages, with their names there."""
     found: dict[type, str] = {}
     for names in LIBRARIES.values():
         for package in map(import_module, names):
@@ -277,9 +277,10 @@ def as_it_stands(
     options: Any,
     lines: list[str],
 ) -> None:
-    """What is set apart after a colon keeps its lines, and what precedes a colon is no type.
+    """Preserve the lines of indented blocks after a colon, and the docstrings of properties.
 
-    For the latter, texts of properties are held back from napoleon, which takes it for one.
+    The docstrings of properties are hidden from napoleon, which would take the text before a colon
+    for a type.
     """
     for number, pair in enumerate(zip(lines, lines[2:], strict=False)):
         line, following = pair
@@ -292,7 +293,7 @@ def as_it_stands(
 
 
 def put_back(held: dict[str, list[str]], *told: Any) -> None:
-    """The text of a property as it was; ``told`` is what an extension is told of a text."""
+    """Restore the docstring of a property; ``told`` are the arguments of the Sphinx event."""
     _, _, name, _, _, lines = told
     if name in held:
         lines[:] = held.pop(name)
@@ -301,7 +302,7 @@ def put_back(held: dict[str, list[str]], *told: Any) -> None:
 def with_links(
     app: Sphinx, what: str, name: str, value: Any, options: Any, lines: list[str]
 ) -> None:
-    """Public names in the text of a package lead to where they are documented."""
+    """Link public names in the docstring of a package to their documentation."""
     if what == "module" and name.startswith(tuple(LIBRARIES)):
         public = "|".join(value.__all__)
         lines[:] = [
@@ -312,7 +313,7 @@ def with_links(
 def name_of_ours(
     app: Sphinx, env: BuildEnvironment, node: nodes.Element, text: nodes.TextElement
 ) -> nodes.Node | None:
-    """What has no place on the pages is just text: types of others, names that are not public."""
+    """Return names without a place on the pages as plain text: foreign types and private names."""
     if node.get("refdomain") != "py":
         return None
     if isinstance(text, nodes.literal):
@@ -323,7 +324,7 @@ def name_of_ours(
 
 @cache
 def _names() -> set[str]:
-    """Everything that modules of the libraries define, and what their classes have."""
+    """Return all names that modules of the libraries define, and the members of classes."""
     found: set[str] = set()
     for library in LIBRARIES:
         found.update(*(vars(module) for module in _modules(library)))

@@ -1,4 +1,4 @@
-"""Formulas as MathML, which browsers draw themselves: no script, and nothing to fetch."""
+"""Formulas as MathML, which browsers render themselves, without scripts or downloads."""
 
 from __future__ import annotations
 

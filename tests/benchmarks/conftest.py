@@ -1,4 +1,4 @@
-"""The record all benches append to."""
+"""Record that all benchmarks append to."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RECORD = Path(__file__).with_name("record.csv")
 
 @pytest.fixture(autouse=True)
 def compiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Loops are compiled from the start: what is measured is what goes on for long."""
+    """Compile loops from the start, as the steady state is measured."""
     monkeypatch.setattr(loops, "PAYS", 0)
 
 

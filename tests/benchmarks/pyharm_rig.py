@@ -1,8 +1,8 @@
-"""The friction rig by pyHarm (``pyharm-os`` on PyPI), run by an interpreter that has it.
+"""The friction rig solved by pyHarm (``pyharm-os`` on PyPI), in an interpreter that has it.
 
-A problem comes in as JSON and what was found goes out as JSON; see ``test_vibration_speed.py``.
-Everything is pyHarm's default but for the longest step, and for units in which its unknowns are of
-the order of 1: a micrometre and 100 Hz. Its other solver, Newton-Raphson, takes longer.
+A problem is read as JSON and the result is written as JSON; see ``test_vibration_speed.py``. All
+settings are pyHarm's defaults except the longest step, and units in which its unknowns are of the
+order of 1: a micrometre and 100 Hz. Its other solver, Newton-Raphson, takes longer.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LENGTH, FREQUENCY = 1e-3, 100.0  # mm, Hz
 
 
 def described(problem: dict) -> dict:
-    """pyHarm's input."""
+    """Return pyHarm's input."""
     low, high = (2.0 * np.pi * frequency for frequency in problem["frequencies"])
     matrices = {name: np.array(problem[name]) for name in "MCK"}
     return {
@@ -67,7 +67,7 @@ def described(problem: dict) -> dict:
 
 
 def followed(problem: dict) -> tuple[np.ndarray, float]:
-    """Unknowns of the accepted points ``(s, n + 1)``, and the processor seconds they took."""
+    """Return unknowns of the accepted points ``(s, n + 1)``, and the processor seconds."""
     work = Maestro(described(problem))
     begin = time.process_time()
     work.operate()

@@ -1,8 +1,7 @@
-"""The bench of whole commands, from start to end, with figures and files for ParaView.
+"""Benchmark of complete commands, with figures and files for ParaView.
 
-Nothing is in the cache of condensed structures. Seconds of the processor are those of the command
-and all its processes; the wall's depend on what else the machine does, and are recorded beside
-them.
+The cache of condensed structures is empty. Processor seconds are those of the command and all its
+processes; wall seconds depend on other work of the machine, and are recorded in addition.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ import pytest
 from tests.marks import slow
 
 ROOT = Path(__file__).parents[2]
-# Overrides of each, and the processor seconds that it may take.
+# Case and overrides of each command, and the processor seconds that it may take.
 COMMANDS = {
     "sphere_normal": ("sphere_normal", (), 15.0),
     "dovetail_2d": ("dovetail_2d", (), 60.0),
@@ -29,7 +28,7 @@ COMMANDS = {
 
 
 def used() -> float:
-    """Processor seconds of all processes of this one that have ended."""
+    """Return the processor seconds of all ended child processes."""
     spent = resource.getrusage(resource.RUSAGE_CHILDREN)
     return spent.ru_utime + spent.ru_stime
 

@@ -1,7 +1,7 @@
-"""The bench of half-space contacts that are not spheres of alike bodies: rough ones, unlike bodies,
-large grids, and the first solve of a process.
+"""Benchmark of half-space contacts other than spheres of similar bodies.
 
-Convolutions and iterations are counts; seconds are of the processor, on one thread.
+It covers rough surfaces, dissimilar bodies, large grids, and the first solve of a process.
+Convolutions and iterations are counts; seconds are processor seconds on one thread.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ TITANIUM = Material(115e3, 0.29)
 ALIKE = ElasticPair(TITANIUM, TITANIUM)
 RIGID_FLAT = ElasticPair(Material(np.inf, 0.3), TITANIUM)
 CELLS = 256
-# Of rough surfaces: Hurst's exponent, the shortest wave in cells, and the height over the approach
-# of the smooth body. The harsh one has all waves that the grid has.
+# Rough surfaces: Hurst's exponent, the shortest wave in cells, and the height over the approach of
+# the smooth body. The harsh one has all waves of the grid.
 SPECTRA = {"smooth": (0.8, 16.0, 0.1), "harsh": (0.3, 2.0, 0.1)}
 LONGEST = 0.25  # wave, over the width of the grid
 # Share of the largest depth that wear takes between a cold and a warm solve.
@@ -37,13 +37,13 @@ WORN = 0.02
 # the residual from 1e-4 to 1e-8; with 5 cells of 4082 changed it takes 12. Those of unlike
 # bodies are on a box of 96 x 96 cells, in units of the whole grid.
 ROUGH, UNLIKE, RATIO = (60, 25), 25, 4.0
-# Of 2048 x 2048 cells: convolutions and memory [GB].
+# Allowed for 2048 x 2048 cells: convolutions and memory [GB].
 LARGEST, LARGEST_MEMORY = 20, 6.0
 FIRST = 0.3  # seconds of the first solve
 
 
 def sphere(cells: int, pair: ElasticPair, share: float = 0.6) -> tuple[HalfSpace, Array, float]:
-    """Half-space, height [mm] and load [N] of a sphere, its radius ``share`` of half the grid."""
+    """Return half-space, height [mm] and load [N] of a sphere that fills ``share`` of the grid."""
     hertz = HertzSphere(400.0, 10.0, pair.contact_modulus)
     width = 2.0 * hertz.contact_radius / share
     grid = Grid.covering((width, width), (cells, cells))
@@ -51,10 +51,10 @@ def sphere(cells: int, pair: ElasticPair, share: float = 0.6) -> tuple[HalfSpace
 
 
 def roughness(grid: Grid, hurst: float, shortest: float) -> Array:
-    """A self-affine field of root mean square 1, without waves below ``shortest`` cells."""
+    """Return a self-affine field of root mean square 1, without waves below ``shortest`` cells."""
     noise = np.fft.fft2(np.random.default_rng(0).standard_normal(grid.shape))
     wave = np.hypot(*np.meshgrid(*(np.fft.fftfreq(n) for n in grid.shape), indexing="ij"))
-    # Of the amplitude: the spectrum of heights falls by twice that.
+    # Exponent of the amplitude; the power spectrum of heights has twice that.
     falls = np.maximum(wave, 1.0 / (LONGEST * grid.shape[0])) ** -(1.0 + hurst)
     falls[wave > 1.0 / shortest] = 0.0
     field = np.fft.ifft2(noise * falls).real
@@ -63,7 +63,7 @@ def roughness(grid: Grid, hurst: float, shortest: float) -> Array:
 
 @pytest.mark.parametrize("spectrum", SPECTRA)
 def test_rough_surfaces(spectrum: str, record: dict[str, float]) -> None:
-    """A rough sphere, cold, and warm after a little wear."""
+    """A rough sphere is solved from a cold start, and from a warm one after a little wear."""
     hurst, shortest, height = SPECTRA[spectrum]
     half_space, gap, load = sphere(CELLS, ALIKE)
     contact = NormalContact(half_space)
@@ -83,7 +83,7 @@ def test_rough_surfaces(spectrum: str, record: dict[str, float]) -> None:
 
 
 def sheared(pair: ElasticPair, cells: int) -> tuple[ContactState, ContactState, float]:
-    """A sphere pressed, then sheared by 0.75 µP; and the seconds of both, the least of three."""
+    """Return a sphere pressed, then sheared by 0.75 µP; and the seconds of both, best of three."""
     half_space, height, load = sphere(cells, pair)
     contact, times = FrictionalContact(half_space, 0.5), []
     for _ in range(3):
@@ -96,7 +96,7 @@ def sheared(pair: ElasticPair, cells: int) -> tuple[ContactState, ContactState, 
 
 
 def test_unlike_bodies(record: dict[str, float]) -> None:
-    """Pressure and shear solved together, against alike bodies in the same run."""
+    """Solving pressure and shear together is compared with similar bodies in the same run."""
     *_, alike = sheared(ALIKE, 128)
     pressed, moved, spent = sheared(RIGID_FLAT, 128)
     assert pressed.converged
@@ -109,7 +109,7 @@ def test_unlike_bodies(record: dict[str, float]) -> None:
 
 
 def in_a_process(function: str) -> dict[str, float]:
-    """What a function of this file says in a fresh process."""
+    """Return the output of a function of this file in a fresh process."""
     code = f"import json; from {__name__} import {function}; print(json.dumps({function}()))"
     code = f"import sys; sys.path.insert(0, {sys.path[0]!r}); {code}"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
@@ -118,9 +118,10 @@ def in_a_process(function: str) -> dict[str, float]:
 
 
 def first_solve() -> dict[str, float]:
-    """Seconds of the first solve of this process at 256², and of the next; modules are loaded.
+    """Return seconds of the first solve of this process at 256², and of the next, without imports.
 
-    Not those that it does without, as the compiler (:mod:`sa_solver.transforms.passes`).
+    The compiler, which the first solves do without, is not counted
+    (:mod:`sa_solver.transforms.passes`).
     """
     small, gap, load = sphere(16, ALIKE)
     NormalContact(small).solve(gap, load)
@@ -141,7 +142,7 @@ def test_the_first_solve(record: dict[str, float]) -> None:
 
 
 def largest_grid() -> dict[str, float]:
-    """A sphere on 2048²: convolutions to 1e-6 and 1e-8, seconds of these, and peak memory [GB]."""
+    """Solve a sphere on 2048²: convolutions to 1e-6 and 1e-8, seconds, and peak memory [GB]."""
     half_space, height, load = sphere(2048, ALIKE)
     contact = NormalContact(half_space)
     rough = contact.solve(height, load, tolerance=1e-6)

@@ -1,6 +1,6 @@
-"""The bench: work counted (iterations, convolutions) and times as ratios within one run.
+"""Benchmark of counted work (iterations, convolutions), with times as ratios within one run.
 
-``make bench`` prints a line per measure and appends it to ``record.csv`` beside this file, so that
+``make bench`` prints a line per measure and appends it to ``record.csv`` in this folder, so that
 a change of speed can be seen in the history. Seconds on shared machines say little: the record
 holds counts, and times relative to one zero-padded convolution or one product with the joint's
 matrix, measured in the same run.
@@ -26,7 +26,7 @@ TITANIUM = Material(115e3, 0.29, 4.43e-9)
 
 
 def seconds(action: Callable[[], object], repeat: int) -> float:
-    """Shortest time of ``action`` in ``repeat`` tries."""
+    """Return the shortest time of ``action`` in ``repeat`` tries."""
     times = []
     for _ in range(repeat):
         begin = time.perf_counter()
@@ -36,7 +36,7 @@ def seconds(action: Callable[[], object], repeat: int) -> float:
 
 
 def test_contact_of_the_default_flank(record: dict[str, float]) -> None:
-    """Cold, and warm after a little wear, at peak load on 128 x 256 cells."""
+    """The contact is solved at peak load on 128 x 256 cells, cold, and warm after wear."""
     dovetail = CASE.structure.geometry()
     grid = Grid.covering(dovetail.flank_size(), CASE.contact.grid)
     contact = NormalContact(HalfSpace(grid, ElasticPair(TITANIUM, TITANIUM)))
@@ -55,7 +55,7 @@ def test_contact_of_the_default_flank(record: dict[str, float]) -> None:
 
 
 def test_friction_of_the_default_joint(record: dict[str, float]) -> None:
-    """Iterations of the two missions, and what an iteration costs against its matrix product."""
+    """The two missions give iterations, and the time of one over that of its matrix product."""
     dovetail = CASE.structure.geometry()
     mission = Mission(**CASE.load_path.missions()[0])
     mesh = dovetail.mesh(CASE.mesh.flank_nodes, CASE.mesh.size)

@@ -1,6 +1,6 @@
-"""The bench of the structural stage: assembly, factors, multigrid, the cached joint, its cycle.
+"""Benchmark of the structural stage: assembly, factors, multigrid, the cached joint, its cycle.
 
-The limits are absolute, for two cores with one thread each; the record takes the seconds.
+The limits are absolute, for two cores with one thread each; the record has the seconds.
 """
 
 import time
@@ -34,7 +34,7 @@ TRIES = 3
 
 
 def shortest(action: Callable[[], object]) -> float:
-    """Least seconds of ``action``."""
+    """Return the least seconds of ``action``."""
     times = []
     for _ in range(TRIES):
         begin = time.perf_counter()
@@ -44,7 +44,7 @@ def shortest(action: Callable[[], object]) -> float:
 
 
 def cube() -> Body:
-    """107 811 unknowns, the shape whose factors fill most."""
+    """Return a body of 107 811 unknowns, in the shape with the densest factors."""
     return Body("cube", MeshTet.init_tensor(*[np.linspace(0.0, 1.0, 33)] * 3))
 
 
@@ -54,7 +54,7 @@ def blade() -> Body:
 
 
 def held_below(elastic: ElasticBody) -> tuple[Array, Array]:
-    """Free displacements of a body clamped at its lowest nodes, and a load on them."""
+    """Return free displacements of a body clamped at its lowest nodes, and a load on them."""
     height = elastic.nodes[:, 2]
     nodes = np.flatnonzero(height > height.min() + 1e-6 * np.ptp(height))
     free = (3 * nodes[:, None] + np.arange(3)).ravel()
@@ -63,7 +63,7 @@ def held_below(elastic: ElasticBody) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("make", [cube, blade])
 def test_large_body(make: Callable[[], Body], record: dict[str, float]) -> None:
-    """Assembled, factorised and solved; then the same solution by multigrid."""
+    """It is assembled, factorised and solved; then solved by multigrid."""
     body = make()
     name = f"{body.name}, {3 * body.mesh.nvertices} unknowns"
     free, load = held_below(ElasticBody(body, TITANIUM))
@@ -88,7 +88,7 @@ def test_large_body(make: Callable[[], Body], record: dict[str, float]) -> None:
 def test_default_joint(
     record: dict[str, float], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Condensed once, found in the cache after that; and two cycles of 22 increments from rest."""
+    """It is condensed once, then found in the cache; two cycles of 22 increments follow."""
     assert isinstance(CASE, DovetailCase)
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path))
 

@@ -1,12 +1,12 @@
-"""Side by side with Tamaas: Hertz contact, not periodic, one thread, equal residual.
+"""Comparison with Tamaas: Hertz contact, not periodic, one thread, equal residual.
 
 A sphere whose contact radius is 0.6 of the grid's half width. Tamaas (``pip install tamaas``, used
 here only) solves with Polonsky and Keer's conjugate gradients and its zero-padded operator. Both
 results are judged by our residuals, on our operator; Tamaas's tolerance is the loosest that meets
-the bound. Times are medians of processor seconds of several runs, set-up apart and reported.
+the bound. Times are medians of processor seconds of several runs; set-up is reported separately.
 
-To be run alone, as `make bench` does: where MKL is loaded (the structural tests load it), its
-transforms take the place of the FFTW that Tamaas ships with and make it three times faster.
+It must be run alone, as by `make bench`: where MKL is loaded (the structural tests load it), its
+transforms replace the FFTW that Tamaas ships with and make it three times faster.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ GOAL = 12.0
 
 
 def seconds(action: Callable[[], object], runs: int) -> float:
-    """Median processor time of ``action``."""
+    """Return the median processor time of ``action``."""
     times = []
     for _ in range(runs):
         begin = time.process_time()
@@ -52,7 +52,7 @@ def sphere(cells: int) -> tuple[Grid, Array]:
 
 
 def residual_of(half_space: HalfSpace, height: Array, pressure: Array) -> float:
-    """Penetration or complementarity, with the approach that makes Σ p g vanish."""
+    """Return penetration or complementarity, with the approach that makes Σ p g vanish."""
     moved = half_space.normal(pressure)
     lifted = height + moved
     approach = np.vdot(lifted, pressure) / pressure.sum()
@@ -119,7 +119,7 @@ def test_faster_than_tamaas(
 
 
 def test_convolutions_hardly_grow_with_the_grid(record: dict[str, float]) -> None:
-    """At most half as many again from 128² to 1024² cells, at 1e-8, coarser grids included."""
+    """They grow by at most half from 128² to 1024² cells, at 1e-8, including coarser grids."""
     counts = []
     for cells in (128, 256, 512, 1024):
         grid, height = sphere(cells)

@@ -1,6 +1,6 @@
-"""The bench of shear: convolutions by load and grid, times as ratios to one convolution.
+"""Benchmark of shear: convolutions by load and grid, times as ratios to one convolution.
 
-And a cycle of 22 increments, cold and worn a little: convolutions and transforms counted.
+A cycle of 22 increments, cold and slightly worn, counts convolutions and transforms.
 """
 
 import time
@@ -25,7 +25,7 @@ SLIDING = FRICTION * 400.0
 
 
 def seconds(action: Callable[[], object], repeat: int) -> float:
-    """Shortest processor time of ``action`` in ``repeat`` tries."""
+    """Return the shortest processor time of ``action`` in ``repeat`` tries."""
     times = []
     for _ in range(repeat):
         begin = time.process_time()
@@ -54,7 +54,7 @@ def test_convolutions_by_share_of_sliding(share: float, record: dict[str, float]
 
 
 def test_convolutions_by_grid(record: dict[str, float]) -> None:
-    """At Q/µP 0.75: at most half as many again from 64 x 64 to 256 x 256, 30 at 512 x 512."""
+    """At Q/µP 0.75 they grow by at most half from 64 x 64 to 256 x 256; 30 at 512 x 512."""
     counts = {}
     for cells in (64, 128, 256, 512, 1024):
         contact, limit = sphere(cells)
@@ -69,7 +69,7 @@ def test_convolutions_by_grid(record: dict[str, float]) -> None:
 
 
 def flank() -> tuple[FrictionalContact, Array, Array]:
-    """A flank on 128 x 256 cells, its height, and loads ``(22, 6)`` that all change."""
+    """Return a flank on 128 x 256 cells, its height, and loads ``(22, 6)`` that all change."""
     grid = Grid.covering((10.0, 60.0), (128, 256))
     height = np.maximum(np.abs(grid.x) - 4.0, 0.0) ** 2 / 60.0
     height = height + np.maximum(np.abs(grid.y) - 27.0, 0.0) ** 2 / 300.0
@@ -86,7 +86,7 @@ def marched(
     loads: Array,
     starts: Sequence[ContactStart | None] = (None,) * 22,
 ) -> list[ContactState]:
-    """The states of a cycle from rest."""
+    """Return the states of a cycle from rest."""
     states = [contact.apart(height)]
     for values, start in zip(loads, starts, strict=True):
         states.append(contact.advance(states[-1], height, ContactLoad(values), start))
@@ -97,7 +97,7 @@ def marched(
 def test_a_cycle_of_22_increments(
     record: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Normal and tangential problems of a flank, from rest, in processor seconds and in counts."""
+    """Normal and tangential problems of a flank, from rest, give processor seconds and counts."""
     contact, height, loads = flank()
     transforms = 0
     one_way = Transform.backward
@@ -126,7 +126,7 @@ def test_a_cycle_of_22_increments(
 
 
 def test_the_cycle_worn_a_little(record: dict[str, float]) -> None:
-    """Marched anew on surfaces that have lost 10 nm where it pressed most, from what it was."""
+    """The cycle is repeated from its states on surfaces worn by up to 10 nm."""
     contact, height, loads = flank()
     new = marched(contact, height, loads)
     pressure = max((state.pressure for state in new), key=np.sum)

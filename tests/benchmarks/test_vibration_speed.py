@@ -1,9 +1,9 @@
-"""The bench of harmonic balance: a point of the rig's response, a node of a contact, and a response
-of the rig with its 121 contacts.
+"""Benchmark of harmonic balance: a response point, a contact node, and a whole response.
 
-The rig is also followed by pyHarm, a Python package for the same task, in an environment of its own
-that `make bench` installs: the same equations, so the same motions, and about as many points.
-Times are processor time in one thread, the least of several tries on a shared machine.
+The rig, with its 121 contacts, is also solved by pyHarm, a Python package for the same task, in a
+separate environment that `make bench` installs: the same equations, so the same motions, with about
+as many points. Times are processor time in one thread, the best of several tries on a shared
+machine.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def contacts(tmp_path_factory: pytest.TempPathFactory) -> HarmonicBalance:
 def test_response_of_the_contacts(
     odd: int, contacts: HarmonicBalance, record: dict[str, float]
 ) -> None:
-    """Two reduced specimens, 121 contacts with gaps, preload, harmonic 0 and odd ones."""
+    """Two reduced specimens have 121 contacts with gaps, preload, harmonic 0 and odd ones."""
     problem = contacts.refined(Resolution((0, *range(1, 2 * odd, 2)), SAMPLES))
     begin = time.perf_counter()
     branch = along_frequency(problem, CONTACTS_FORCE, CONTACTS_SPAN, control=STEPS)
@@ -142,7 +142,7 @@ def test_response_of_the_contacts(
 
 @pytest.mark.slow
 def test_response_of_sliding_contacts(contacts: HarmonicBalance, record: dict[str, float]) -> None:
-    """The same under a force that slides all contacts, through the peak at 39 Hz."""
+    """The same response is solved under a force that slides all contacts, past 39 Hz."""
     problem = contacts.refined(Resolution((0, *range(1, 10, 2)), SAMPLES))
     begin = time.process_time()
     branch = along_frequency(problem, SLIDING_FORCE, SLIDING_SPAN, control=STEPS)
@@ -154,7 +154,7 @@ def test_response_of_sliding_contacts(contacts: HarmonicBalance, record: dict[st
 
 
 def by_pyharm(folder: Path) -> dict[str, Any]:
-    """It writes its settings where it runs: into ``folder``."""
+    """Solve by pyHarm, which writes its settings into its working folder ``folder``."""
     if not INSTALLED.exists():
         pytest.skip("no pyHarm in .venv/pyharm: `make bench` installs it")
     asked = {
@@ -184,7 +184,7 @@ def by_pyharm(folder: Path) -> dict[str, Any]:
 
 
 def amplitudes_at(problem: HarmonicBalance, frequencies: Array) -> Array:
-    """Harmonic 1 of both masses at these frequencies ``(s, 2)``, from the closest motion."""
+    """Return harmonic 1 of both masses at these frequencies ``(s, 2)``, from the closest motion."""
     branch, amplitudes = response(problem), []
     for frequency in frequencies:
         closest = int(np.argmin(abs(branch.frequencies - frequency)))
@@ -195,7 +195,7 @@ def amplitudes_at(problem: HarmonicBalance, frequencies: Array) -> Array:
 
 
 def test_rig_by_pyharm(problem: HarmonicBalance, record: dict[str, float], tmp_path: Path) -> None:
-    """Same problem, same run: the same motions, and how many times longer they take."""
+    """The same problem gives the same motions; the ratio of the times is recorded."""
     theirs = by_pyharm(tmp_path)
     frequencies = np.array(theirs["frequency"])
     inside = (frequencies >= SPAN[0]) & (frequencies <= SPAN[1])

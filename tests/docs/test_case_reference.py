@@ -1,4 +1,4 @@
-"""The reference of case entries has every entry there is; the gallery has every case."""
+"""The reference of case entries has every entry; the gallery has every case."""
 
 import importlib
 import re
@@ -18,7 +18,7 @@ LARGEST_PICTURE, LARGEST_GALLERY = 60_000, 1_500_000
 
 
 def paths_of(schema, node, path=""):
-    """Paths of all leaves below a node of a JSON schema, lists as [], by its references alone."""
+    """Return paths of all leaves below a node of a JSON schema, lists as [], by its references."""
     if "$ref" in node:
         node = schema["$defs"][node["$ref"].rpartition("/")[2]]
     for part in (*node.get("anyOf", ()), *node.get("oneOf", ())):
@@ -33,7 +33,7 @@ def paths_of(schema, node, path=""):
 
 @pytest.mark.parametrize("kind", list(kinds()))
 def test_every_entry_is_on_the_page_of_its_kind(kind):
-    """The pages are made from the models; here they are walked by their JSON schema."""
+    """The pages are made from the models; here their JSON schema is walked instead."""
     model = kinds()[kind]
     schema = TypeAdapter(model).json_schema()
     wanted = set(paths_of(schema, schema))

@@ -1,4 +1,4 @@
-"""What "Cost against size" says is what was measured, and still so."""
+"""The numbers of "Cost against size" are those measured, and current."""
 
 import csv
 import re
@@ -14,7 +14,7 @@ PAGE = (DOCS / "cost.md").read_text(encoding="utf-8")
 
 @pytest.fixture(scope="module")
 def cost():
-    """The scripts of the page, which are no package."""
+    """Return the scripts of the page, which are no package."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "path", [str(DOCS), *sys.path])
         import cost_charts
@@ -45,7 +45,7 @@ def test_how_large_follows_from_the_points(cost):
 
 
 def test_powers_in_words_are_those_of_the_points(cost):
-    """All are listed in comments at the end of the page."""
+    """All exponents are listed in comments at the end of the page."""
     charts, _ = cost
     told = re.findall(r"^% (\w+) (\w+) (\d\.\d)$", PAGE, flags=re.MULTILINE)
     assert len(told) >= 5

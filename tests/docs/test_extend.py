@@ -1,4 +1,4 @@
-"""The changes that "How to extend" shows apply to the packages as they are, and work."""
+"""The changes that "How to extend" shows apply to the current packages, and work."""
 
 import json
 import os
@@ -32,7 +32,7 @@ WORN = (
 
 @pytest.fixture
 def changed(tmp_path):
-    """What applies a patch to a copy of the packages, and runs the command of that copy."""
+    """Return a function that patches a copy of the packages and runs the copy's command."""
     if shutil.which("git") is None:
         pytest.skip("git applies the patches")
     for package in PACKAGES:
@@ -62,7 +62,7 @@ def changed(tmp_path):
 @pytest.mark.skipif(shutil.which("git") is None, reason="git applies the patches")
 @pytest.mark.parametrize("patch", sorted((ROOT / "docs" / "extend").glob("*.patch")))
 def test_patches_apply(patch, tmp_path):
-    """To files as they are: lines beside the change are those that the patch knows."""
+    """They apply to the current files: context lines match."""
     for line in patch.read_text("utf-8").splitlines():
         if line.startswith("+++ b/"):
             name = line.removeprefix("+++ b/")
@@ -78,7 +78,7 @@ def settings(overrides):
 
 @pytest.mark.slow
 def test_wear_law(changed, tmp_path):
-    """A slip of half the reference a cycle halves the coefficient; of twice it doubles it."""
+    """Half the reference slip per cycle halves the coefficient, twice doubles it."""
     command = changed("wear_law.patch")
     command("new", "line_wear", "case.yaml")
     command("run", "case.yaml", "--out", "out", *settings(WORN))
@@ -89,7 +89,7 @@ def test_wear_law(changed, tmp_path):
 
 @pytest.mark.slow
 def test_joint_law(changed, tmp_path):
-    """Its loop loses as much as sliders with its share of spread ones; cases take it."""
+    """Its loop loses as much as sliders with its share of spread ones; cases accept it."""
     command = changed("joint_law.patch")
     (tmp_path / "case.yaml").write_text(RIG, encoding="utf-8")
     assert "mixed_iwan, normal load 60 N" in command("check", "case.yaml")

@@ -1,4 +1,4 @@
-"""What a contact must fulfil, evaluated anew from its fields, whichever method found them."""
+"""Conditions of a contact, evaluated from its fields, independently of the method."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ SMALLEST = 1e-4
 
 
 def love_matrix(grid, contact_modulus):
-    """Normal displacement of every cell under unit pressure on every other, by Love's formula."""
+    """Return the normal displacement of every cell under unit pressure on every other (Love)."""
     x, y = (coordinate.ravel() for coordinate in np.broadcast_arrays(grid.x, grid.y))
     half = 0.5 * grid.pitch[0], 0.5 * grid.pitch[1]
     return love_displacement(
@@ -19,7 +19,7 @@ def love_matrix(grid, contact_modulus):
 
 
 def normal_error(grid, contact_modulus, height, state):
-    """Largest of penetration, complementarity and missing load, with a dense matrix."""
+    """Return the largest of penetration, complementarity and missing load, by a dense matrix."""
     p = state.pressure
     moved = (love_matrix(grid, contact_modulus) @ p.ravel()).reshape(grid.shape)
     gap = height + moved - (state.approach + state.tilt_x * grid.y - state.tilt_y * grid.x)
@@ -36,7 +36,7 @@ def normal_error(grid, contact_modulus, height, state):
 
 
 def frictional_error(contact, before, height, state, load):
-    """Largest violation of any condition of an increment, relative."""
+    """Return the largest relative violation of any condition of an increment."""
     grid, pair = contact.grid, contact.half_space.pair
     moved = HalfSpace(grid, pair).displacement(state.traction)
     shear, pressure = state.shear, state.pressure

@@ -19,7 +19,7 @@ ALONG = ("x", "y", "z")
 
 
 def body(normal=900.0, ratio=0.01):
-    """A mass on springs, with one contact; without ``normal`` spring only that holds it along z."""
+    """Return a mass on springs with one contact; without ``normal`` only that holds it along z."""
     springs = {Link("x"): 500.0, Link("y"): 700.0}
     if normal:
         springs[Link("z")] = normal
@@ -28,7 +28,7 @@ def body(normal=900.0, ratio=0.01):
 
 
 def balance(model, law, waves, static=0.0, highest=5, samples=128):
-    """Shaken by cosines ``waves`` and pressed by ``static`` along z."""
+    """Return the balance of a model under cosines ``waves`` and a ``static`` load along z."""
     wave = sum(amplitude * unit_force(model, name) for name, amplitude in waves.items())
     load = PeriodicLoad({1: wave}, static * unit_force(model, "z"))
     resolution = Resolution(tuple(range(highest + 1)), samples)
@@ -40,7 +40,7 @@ def contact(load=0.0, gap=0.0):
 
 
 def linear(model, held, frequency, force):
-    """Complex amplitudes ``(n,)`` of a structure whose joints are springs ``held`` ``(j d,)``."""
+    """Return complex amplitudes ``(n,)`` of a structure with joint springs ``held`` ``(j d,)``."""
     omega = 2.0 * np.pi * frequency
     stiffness = model.stiffness + model.connection.T @ np.diag(held) @ model.connection
     dynamic = stiffness + 1j * omega * model.damping - omega**2 * model.mass
@@ -48,7 +48,7 @@ def linear(model, held, frequency, force):
 
 
 def rig(highest=15, samples=256):
-    """The thesis's rig with one Jenkins joint."""
+    """Return the thesis's rig with one Jenkins joint."""
     model = two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), 0.001)
     load = PeriodicLoad({1: -1j * unit_force(model, "m1")})
     harmonics = tuple(range(1, highest + 1, 2))

@@ -1,4 +1,4 @@
-"""The sphere that more than one module presses and shears."""
+"""Sphere that several test modules press and shear."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ BOTH = pytest.mark.parametrize("kind", PAIRS)
 
 
 def sphere(kind, cells=32):
-    """A contact that takes two thirds of its grid under P, and its gap."""
+    """Return a contact that takes two thirds of its grid under P, and its gap."""
     pair = PAIRS[kind]
     size = 3.0 * (0.75 * P * RADIUS / pair.contact_modulus) ** (1 / 3)
     grid = Grid.covering((size, size), (cells, cells))

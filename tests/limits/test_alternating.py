@@ -1,8 +1,8 @@
-"""Where adjusting pressure and shear to each other in turns stops converging.
+"""Limits of convergence when pressure and shear are solved alternately.
 
-Its changes shrink by about µβ per round where the contact slides, so that its border is µβ = 1.
+Changes shrink by about µβ per round where the contact slides, so that the limit is µβ = 1.
 Contacts that stick under pressure alone stay on the safe side of it. With β at most 0.5 and µ up
-to 1 it therefore converges, ever more slowly; solving both together needs no such limit.
+to 1 the iteration therefore converges, ever more slowly; solving both together has no such limit.
 """
 
 import numpy as np
@@ -59,7 +59,7 @@ def together(build, friction, beta, share=SHARE):
 
 
 def factor(changes):
-    """Mean factor of the last rounds."""
+    """Return the mean factor of the last rounds."""
     count = min(4, len(changes) - 1)
     return (changes[-1] / changes[-1 - count]) ** (1 / count)
 

@@ -40,7 +40,7 @@ STEP = 1.0
 
 
 def strip(cells=256, margin=0.25):
-    """A flat of half width 1 mm that is a whole number of cells, with a step at its ends."""
+    """Return a flat of half width 1 mm, a whole number of cells, with a step at its ends."""
     grid = Grid.strips(2.0 * (HALF + margin), cells)
     return grid, np.where(np.abs(grid.x) < HALF, 0.0, STEP)
 
@@ -54,7 +54,7 @@ def solve(grid, height, off_centre, pair=PAIR):
 
 @pytest.mark.parametrize("off_centre", [0.0, 0.25, 0.48])
 def test_up_to_a_quarter_of_its_width_all_of_a_flat_presses(off_centre):
-    """To 1 % ten cells from the singular ends: k cells from them, about 1/16 k is missing."""
+    """Pressure is within 1 % ten cells from the singular ends; k cells away, 1/16 k is missing."""
     grid, height = strip(320)
     state = solve(grid, height, off_centre)
     flat = height == 0.0
@@ -69,7 +69,7 @@ def test_up_to_a_quarter_of_its_width_all_of_a_flat_presses(off_centre):
 
 @pytest.mark.parametrize("off_centre", [0.52, 0.75, 0.9])
 def test_beyond_it_lifts_at_one_end(off_centre):
-    """Contact length 4 (a - e) to a cell; pressure to 2 % three cells from either end."""
+    """Contact length is 4 (a - e) to a cell; pressure to 2 % three cells from either end."""
     grid, height = strip(640)
     state = solve(grid, height, off_centre)
     assert state.converged
@@ -84,7 +84,7 @@ def test_beyond_it_lifts_at_one_end(off_centre):
 
 
 def test_at_the_edge_of_a_flat_one_cell_carries_it_and_beyond_the_body_falls_over():
-    """Past the last cell of the flat it comes to rest on what is beside: here, the grid's end."""
+    """Past the last cell of the flat it comes to rest on the next surface: the grid's end."""
     grid, height = strip(100)
     last = float(grid.x[height == 0.0].max())
     inside = solve(grid, height, last * (1.0 - 1e-6))
@@ -125,7 +125,7 @@ def test_a_load_acts_within_the_cell_centres_or_is_refused(pair, side, axis):
 
 @pytest.mark.parametrize("pair", [PAIR, UNLIKE], ids=["alike", "unlike"])
 def test_a_contact_reaches_the_border_of_its_grid_or_not(pair):
-    """Half the grid at 1.1 and 0.9 contact radii: only the second is said to be cut off."""
+    """Half the grid is 1.1 and 0.9 contact radii: only the second is reported as cut off."""
     sphere = HertzSphere(P, 10.0, pair.contact_modulus)
     for share, cut in ((1.1, False), (0.9, True)):
         size = 2.0 * share * sphere.contact_radius
@@ -145,7 +145,7 @@ def test_a_contact_reaches_the_border_of_its_grid_or_not(pair):
 
 
 def test_what_is_cut_off_is_solved_as_if_the_body_ended_there():
-    """The same cells on a larger grid with nothing to touch beside them carry the same pressure."""
+    """The same cells on a larger grid without a surface around carry the same pressure."""
     sphere = HertzSphere(P, 10.0, PAIR.contact_modulus)
     pitch = 0.045 * sphere.contact_radius
     small, large = Grid((40, 40), (pitch, pitch)), Grid((60, 60), (pitch, pitch))

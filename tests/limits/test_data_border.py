@@ -1,4 +1,4 @@
-"""Grids and heights at the ends of what numbers can hold: long cells, odd counts, offsets, NaN."""
+"""Tests of extreme grids and heights: long cells, odd counts, offsets, NaN."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def ball(grid):
     ids=lambda grid: f"{grid.shape[0]}x{grid.shape[1]}{'line' * grid.line}",
 )
 def test_any_grid_is_solved(kind, grid):
-    """Cells of 1:20, odd counts, single rows, hardly any cells: every condition is met."""
+    """Cells of 1:20, odd counts, single rows and few cells meet every condition."""
     contact, height = FrictionalContact(HalfSpace(grid, PAIRS[kind]), 0.5), ball(grid)
     state = contact.apart(height)
     for load in (force(P), force(P, 60.0), force(P, -60.0, 60.0), force(0.5 * P, 20.0)):
@@ -58,7 +58,7 @@ def test_any_grid_is_solved(kind, grid):
 
 
 def test_long_cells_find_the_same_contact():
-    """Cells of 1:20 against square ones of the same width: to 1 % in approach, 6 % in pressure.
+    """Cells of 1:20 match square ones of equal width: to 1 % in approach, 6 % in pressure.
 
     Their length is a seventh of the contact's, whose ends are then coarse.
     """
@@ -75,9 +75,9 @@ def test_long_cells_find_the_same_contact():
 @pytest.mark.parametrize("offset", [1e3, -1e3, 2.0**20])
 @pytest.mark.parametrize("load", [1e-2, P])
 def test_heights_far_from_zero_are_those_near_it(kind, offset, load):
-    """A distance between the bodies adds to the approach, and its digits do not cost any.
+    """A distance between the bodies adds to the approach, without loss of digits.
 
-    Heights are rounded to what numbers at the offset can hold, and are the same again without it.
+    Heights are rounded to numbers at the offset, and compared with the same ones without it.
     """
     grid = Grid.covering((1.0, 1.0), (24, 24))
     far = ball(grid) + offset
@@ -97,7 +97,7 @@ def test_heights_far_from_zero_are_those_near_it(kind, offset, load):
 
 @pytest.mark.parametrize("slope", [1.0, 1e4])
 def test_a_slope_of_the_heights_is_a_tilt(slope):
-    """However steep: without moments a body lies as its partner does."""
+    """However steep the slope, without moments a body aligns with its partner."""
     grid = Grid.covering((1.0, 1.0), (24, 24))
     contact = NormalContact(HalfSpace(grid, PAIRS["alike"]))
     free = {"Mx": 0.0, "My": 0.0}
@@ -110,7 +110,7 @@ def test_a_slope_of_the_heights_is_a_tilt(slope):
 
 
 def test_a_gap_that_vanishes_to_rounding_is_no_crash():
-    """A peak of 1 m on one of two strips: the search ended in a division by zero."""
+    """A peak of 1 m on one of two strips once ended the search in a division by zero."""
     grid = Grid.strips(1.0, 2)
     contact = NormalContact(HalfSpace(grid, PAIRS["alike"]))
     state = contact.solve(np.array([[1e3], [0.0]]), 1e-3, My=0.0)

@@ -1,8 +1,9 @@
-"""The rig of two masses under forces from 1 to 90 N, over all frequencies from end to end.
+"""Tests of the rig of two masses under forces from 1 to 90 N, over all frequencies.
 
-Small forces leave the slider stuck, large ones never; in between sticking ends near every resonance
-and superharmonics meet that of the stuck rig. Of every branch that ends well all motions are held
-against the equations of the structure, in its matrices, and some peaks against exact integration.
+Small forces leave the slider stuck, large ones never; in between, sticking ends near every
+resonance and superharmonics meet that of the stuck rig. All motions of every successful branch are
+checked against the equations of the structure, in its matrices, and some peaks against exact
+integration.
 """
 
 from itertools import pairwise
@@ -31,7 +32,7 @@ KT, LIMIT = 45e3, 0.88 * 60.0
 SPAN = (20.0, 400.0)
 FORCES = (*range(1, 14, 4), *range(16, 50, 6), 53, 55, 57, 58, 60, 63, 66, 67, 68, 70, 76, 83, 90)
 STEPS = ContinuationControl(most=0.1)
-# Of the balance: what Newton's method leaves is a share of terms that may cancel.
+# Tolerance of the balance: Newton's residual is relative to terms that may cancel.
 BALANCED = 1e-7
 
 
@@ -50,7 +51,7 @@ def branches():
 
 
 def slider_forces(displacement):
-    """Forces of the slider ``(t,)`` in the second of two equal periods, step by step."""
+    """Return the slider forces ``(t,)`` in the second of two equal periods, step by step."""
     forces, force = [], 0.0
     steps = np.diff(displacement, prepend=displacement[-1])
     for step in [*steps, *steps]:
@@ -60,7 +61,7 @@ def slider_forces(displacement):
 
 
 def missing(motion):
-    """Largest of what is missing of the balance of forces at each harmonic [N]."""
+    """Return the largest residual of the balance of forces at each harmonic [N]."""
     orders = np.array(motion.resolution.harmonics)
     samples = motion.resolution.samples
     times = np.exp(2j * np.pi * np.outer(np.arange(samples), orders) / samples)
@@ -86,8 +87,10 @@ def test_every_branch_reaches_its_end_and_balances(branches):
 
 
 def test_peaks_move_from_the_stuck_rig_to_the_sliding_one(branches):
-    """Lower with every force up to 57 N, and least where most is lost; beyond 4/π of the limit the
-    slider, whose force does not grow, does not hold the first mode."""
+    """They fall with every force up to 57 N, and are lowest where most is dissipated.
+
+    Beyond 4/π of the limit the slider, whose force does not grow, does not hold the first mode.
+    """
     receptance, peaks = {}, {}
     for force, branch in branches.items():
         sizes = branch.first_amplitudes(1)
@@ -116,7 +119,7 @@ def test_downward_the_same_peaks_are_met(branches):
 
 @pytest.mark.parametrize(("force", "error"), [(13, 2e-4), (46, 1.5e-2), (90, 5e-3)])
 def test_peaks_are_those_of_exact_integration(branches, force, error):
-    """From the motion of many harmonics the rig goes on as this says, and stays there."""
+    """Integration starts from the motion with many harmonics and stays there."""
     branch = branches[force]
     near = branch.solutions[int(branch.first_amplitudes(1).argmax())]
     motion, period = problem(24, 2048).solve(near.frequency, force, near), 1.0 / near.frequency

@@ -56,7 +56,7 @@ def strip(cells=400):
 
 
 def conforming(x, P, hollow):
-    """The pressure of full contact."""
+    """Return the pressure of full contact."""
     sign = -1.0 if hollow else 1.0
     flat = (P - sign * FULL) / (np.pi * np.sqrt(HALF**2 - x**2))
     return flat + sign * 2.0 * FULL / (np.pi * HALF) * np.sqrt(1.0 - (x / HALF) ** 2)
@@ -64,7 +64,7 @@ def conforming(x, P, hollow):
 
 @pytest.mark.parametrize("share", [0.97, 1.03, 3.0])
 def test_a_round_strip_is_pressed_into_full_contact(share):
-    """Contact to a cell; pressure to 1 % ten cells from the ends."""
+    """Contact agrees to a cell; pressure to 1 % ten cells from the ends."""
     grid, contact, height = strip()
     P = share * FULL
     state = contact.solve(height, P)
@@ -101,7 +101,7 @@ def test_a_hollow_strip_closes_in_the_middle(share):
 @BOTH
 @pytest.mark.parametrize("radius", [1e2, 1e5, 1e9, 1e15])
 def test_nearly_conforming_bodies_tend_to_flat_ones(kind, radius):
-    """All cells press from some radius on, and the pressure tends to that of a flat as 1/R."""
+    """From some radius on all cells press, and the pressure tends to a flat's as 1/R."""
     pair = PAIRS[kind]
     grid = Grid.covering((1.0, 1.0), (20, 20))
     contact = FrictionalContact(HalfSpace(grid, pair), 0.3)
@@ -124,7 +124,7 @@ def test_nearly_conforming_bodies_tend_to_flat_ones(kind, radius):
 
 
 def ball(kind):
-    """Odd grids have a cell at the apex."""
+    """Return a ball on an odd grid, which has a cell at the apex."""
     pair = PAIRS[kind]
     grid = Grid.covering((1.0, 1.0), (21, 21))
     height = (grid.x**2 + grid.y**2) / 20.0
@@ -137,7 +137,7 @@ def ball(kind):
 
 @BOTH
 def test_a_load_on_one_cell_then_on_five(kind):
-    """Just above, pressures p0 and four times p1 from the two gaps: a system of two equations."""
+    """Just above, pressures p0 and four times p1 follow from a system of two equations."""
     grid, height, pair, limit, (itself, next_to, diagonal, across) = ball(kind)
     contact = FrictionalContact(HalfSpace(grid, pair), 0.3)
     start = contact.apart(height)
@@ -188,7 +188,7 @@ def test_one_cell_carries_shear_up_to_friction_and_no_moment(kind):
     ],
 )
 def test_loads_of_any_size(kind, P):
-    """Tiny ones rest on a cell, huge ones press the whole grid, which is said."""
+    """Tiny loads rest on a cell, huge ones press the whole grid, which is reported."""
     grid, height, pair, limit, _ = ball(kind)
     contact = FrictionalContact(HalfSpace(grid, pair), 0.3)
     start = contact.apart(height)
@@ -203,8 +203,8 @@ def test_loads_of_any_size(kind, P):
 def test_rounding_hides_tiny_loads_on_unlike_bodies_and_it_is_said(P):
     """The splitting's state holds gaps over a cell's compliance: 2e4 MPa here, known to 4e-12.
 
-    A pressure of 4e-4 MPa (1e-6 N) is then had to 1e-8, give or take; with a tolerance as loose as
-    the load is small, so are others.
+    A pressure of 4e-4 MPa (1e-6 N) is then accurate to about 1e-8. Smaller loads are found only
+    with proportionally looser tolerances.
     """
     grid, height, pair, _, _ = ball("unlike")
     contact, values = CoupledContact(HalfSpace(grid, pair), 0.3), [P, 0, 0, 0, 0, 0]
@@ -230,9 +230,9 @@ def rough(cells, rms, seed=0):
 @pytest.mark.parametrize("rms", [1e-6, 1e-3, 1e-1, 10.0])
 @pytest.mark.parametrize("seed", range(3))
 def test_any_roughness_is_solved(rms, seed):
-    """From full contact to rigid bodies on three points, judged by a dense matrix.
+    """From full contact to rigid bodies on three points, a dense matrix confirms the result.
 
-    The displacement is 2 µm where all presses and up to 70 µm where three cells do.
+    The displacement is 2 µm where all cells press and up to 70 µm where three do.
     """
     grid, height = rough(24, rms, seed)
     state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 100.0, 0.0, 0.0)
@@ -248,7 +248,7 @@ def test_any_roughness_is_solved(rms, seed):
 @pytest.mark.parametrize("rms", [1e-3, 1e-1, 1.0])
 @pytest.mark.parametrize("seed", [0, slow(1)])
 def test_any_roughness_of_unlike_bodies_is_solved(rms, seed):
-    """Three cells under a load within the triangle of their centres; then sheared, and back."""
+    """Three cells carry a load within the triangle of their centres; then sheared, and back."""
     grid, height = rough(24, rms, seed)
     contact = FrictionalContact(HalfSpace(grid, PAIRS["unlike"]), 0.5)
     state = contact.apart(height)

@@ -1,4 +1,4 @@
-"""Branches of a contact that closes: their folds are passed, told and taken up."""
+"""Tests of branches of a contact that closes: folds are passed, reported and restarted from."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ STOP = FrictionContact(KT, 1600.0, MU, gap=0.02)
 
 
 def stopped(highest=9, samples=1024):
-    """A mass that hits a stop at its resonance: a spring that hardens.
+    """Return a mass that hits a stop at its resonance: a hardening spring.
 
-    Each sample that begins to touch is a corner of the branch: of 256 samples they show as folds of
-    0.1 Hz beside the highest point, of 1024 no more.
+    Each sample that begins to touch is a corner of the branch: with 256 samples they appear as
+    folds of 0.1 Hz near the highest point, with 1024 no more.
     """
     model = body(normal=800.0, ratio=0.02)
     load = PeriodicLoad({1: -1j * unit_force(model, "z")})
@@ -61,7 +61,7 @@ def test_folds_are_passed_and_told(folded):
 
 @pytest.mark.slow
 def test_motions_that_coexist_are_those_that_time_integration_ends_in(folded):
-    """At 106 Hz: the largest and the smallest of three; the middle one repels."""
+    """At 106 Hz it reaches the largest and the smallest of three; the middle one repels."""
     crossings = np.flatnonzero(np.diff(np.sign(folded.frequencies - 106.0)))
     motions = [stopped(15, 512).solve(106.0, 1.0, folded.solutions[at]) for at in crossings]
     assert all(solution.converged for solution in motions)
@@ -86,7 +86,7 @@ def test_motions_that_coexist_are_those_that_time_integration_ends_in(folded):
 
 
 def highest_point(folded):
-    """The motion on the fold at 108 Hz, to 1e-9 of its frequency."""
+    """Return the motion on the fold at 108 Hz, to 1e-9 of its frequency."""
     problem, last = stopped(), folded.solutions[folded.curve.folds[0] - 1]
     unknowns, below, above = last.coefficients.ravel(), last.frequency, last.frequency + 0.1
     control = newton.NewtonControl(max_iterations=8, max_shortened=1)
@@ -103,7 +103,7 @@ def highest_point(folded):
 
 
 def test_a_branch_that_starts_on_a_fold(folded):
-    """The frequency does not tell the two ways apart there; each is found, one on either side."""
+    """The frequency does not distinguish the two ways there; each is found, one on either side."""
     start, problem = highest_point(folded), stopped()
     at_fold = problem.find(start.frequency, 1.0, start.coefficients.ravel())
     ends = {}
@@ -126,7 +126,7 @@ def test_a_branch_that_starts_on_a_fold(folded):
 
 
 def test_a_start_beyond_a_fold_says_so_or_lands_on_the_other_side(folded):
-    """The largest motion does not exist above the fold: what is found there is the small one."""
+    """The largest motion does not exist above the fold; the small one is found there."""
     largest = max(folded.solutions, key=lambda solution: abs(solution.amplitude(2)))
     beyond = stopped().solve(112.0, 1.0, largest)
     assert beyond.converged
@@ -136,7 +136,7 @@ def test_a_start_beyond_a_fold_says_so_or_lands_on_the_other_side(folded):
 
 @pytest.mark.parametrize("share", [slow(0.25), 0.5, slow(0.75)])
 def test_a_branch_taken_up_in_its_middle_is_the_rest_of_it(folded, share):
-    """Point by point, also where it folds, since a point keeps its tangent and its step."""
+    """Points agree, also at folds, since a point stores its tangent and its step."""
     kept = round(share * len(folded.curve.points))
     part = replace(folded, curve=replace(folded.curve, points=folded.curve.points[:kept]))
     rest = along_frequency(part.problem, 1.0, (60.0, 200.0), part, control=SHORT)

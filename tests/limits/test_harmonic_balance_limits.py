@@ -22,7 +22,7 @@ from wear.joints.periodic.march import SEPARATED, SLIP, STICK, PeriodicMarch
 
 
 def lifting(highest, samples):
-    """Shaken along all directions until it lifts off for half of the cycle."""
+    """Return the balance of a body shaken in all directions, apart for half of the cycle."""
     waves = {"x": 10.0, "y": 4.0j, "z": 30.0 * np.exp(0.7j)}
     return balance(body(ratio=0.03), contact(8.0), waves, 10.0, highest, samples)
 
@@ -32,7 +32,7 @@ FREQUENCY = 60.0
 
 @pytest.fixture(scope="module")
 def resolved():
-    """The same with so many harmonics that 1e-5 is left out."""
+    """Return the solution with so many harmonics that 1e-5 is left out."""
     solution = lifting(40, 2048).solve(FREQUENCY, 1.0)
     assert solution.converged
     assert {STICK, SLIP, SEPARATED} == set(np.unique(solution.cycle.states))
@@ -41,14 +41,14 @@ def resolved():
 
 
 def error_of(solution, resolved):
-    """Of the joints' vibration, over all of it."""
+    """Return the relative error of the joints' vibration."""
     adopted = resolved.resolution.adopt(solution.coefficients, solution.resolution)
     wrong = (adopted - resolved.coefficients)[:, 1:]
     return np.linalg.norm(wrong) / np.linalg.norm(resolved.coefficients[:, 1:])
 
 
 def distance(solution, resolved):
-    """Of motions, over the largest displacement."""
+    """Return the largest difference of motions over the largest displacement."""
     motion, wanted = solution.displacement(256), resolved.displacement(256)
     return np.abs(motion - wanted).max() / np.abs(wanted).max()
 
@@ -75,7 +75,7 @@ def test_too_few_harmonics_for_lift_off_are_added_if_asked(resolved):
 
 @pytest.mark.parametrize("samples", [12, 16, 32])
 def test_too_few_samples_say_so(samples, resolved):
-    """With one sample more than the least allowed it still ends, and tells how wrong it is."""
+    """With one sample above the minimum it still ends, and reports its error."""
     problem = lifting(5, samples)
     rough = problem.solve(FREQUENCY, 1.0)
     assert rough.converged
@@ -100,7 +100,7 @@ def test_what_the_finest_resolution_allowed_leaves_is_told():
 
 
 def test_a_contact_that_sticks_is_its_springs_through_a_resonance():
-    """Pressed so hard that nothing slips: three springs, and all of it in harmonic 1."""
+    """Pressed so hard that nothing slips, it is three springs, with only harmonic 1."""
     model, waves = body(), {"x": 1.0, "y": 0.5j, "z": 0.7}
     problem = balance(model, contact(), waves, 5e4)
     wave = problem.load.waves[1]
@@ -135,7 +135,7 @@ def test_a_contact_with_a_gap_larger_than_the_motion_is_nothing_through_a_resona
 
 
 def test_an_open_contact_that_alone_holds_the_structure():
-    """Nothing presses and nothing pulls: it floats in the gap where it was, and x moves freely."""
+    """Without loads the structure floats in the gap where it was, and x moves freely."""
     model = body(normal=0.0)
     problem = balance(model, contact(gap=0.5), {"x": 1.0, "z": 0.01})
     solution = problem.solve(30.0, 1.0)
@@ -151,7 +151,7 @@ def test_an_open_contact_that_alone_holds_the_structure():
 
 @pytest.mark.parametrize("load", [-8.0, -1e-3])
 def test_a_static_load_that_lifts_the_structure_off_has_no_equilibrium(load):
-    """Only the contact holds it along z, and it is pulled away: there is no periodic motion."""
+    """Only the contact holds it along z, so pulled away it has no periodic motion."""
     problem = balance(body(normal=0.0), contact(), {"x": 1.0}, load)
     solution = problem.solve(30.0, 1.0)
     assert not solution.converged
@@ -163,7 +163,7 @@ def test_a_static_load_that_lifts_the_structure_off_has_no_equilibrium(load):
 
 
 def test_a_static_load_that_lifts_a_held_structure_off_is_linear():
-    """The springs hold it: pulled off its contact by half of the motion more than it moves."""
+    """Springs hold it, pulled off its contact by half more than its motion."""
     model = body()
     problem = balance(model, contact(8.0), {"x": 1.0, "z": 0.1}, -30.0)
     solution = problem.solve(30.0, 1.0)
@@ -180,7 +180,7 @@ def test_a_static_load_that_lifts_a_held_structure_off_is_linear():
 @pytest.mark.parametrize(("load", "static"), [(0.0, 0.0), (0.0, 8.0), (8.0, 8.0), (8.0, 20.0)])
 @pytest.mark.parametrize("normal", [0.0, 900.0, 900.3])
 def test_without_force_it_rests(load, static, normal):
-    """Also where the preload is just what the load presses: rest is at 0 then, and found."""
+    """It rests even where the preload equals the pressing load, at 0."""
     problem = balance(body(normal), contact(load), {"x": 1.0, "z": 0.3}, static)
     solution = problem.solve(30.0, 0.0)
     assert solution.converged
@@ -196,7 +196,7 @@ def test_without_force_it_rests(load, static, normal):
 
 
 def test_without_force_nothing_is_refined():
-    """No vibration: what rounding makes of it is no reason for more harmonics or samples."""
+    """Rounding errors of a vanishing vibration are no reason for more harmonics or samples."""
     problem = balance(body(), contact(8.0), {"x": 1.0}, 8.5, highest=1, samples=16)
     branch = along_frequency(problem, 0.0, (20.0, 60.0), accuracy=Accuracy(1e-3))
     assert branch.message == ""
@@ -207,7 +207,7 @@ def test_without_force_nothing_is_refined():
 
 
 def test_a_force_that_falls_to_nothing_leaves_the_linear_answer():
-    """Down by fifteen orders the rig is its stuck springs: no term is lost, nothing is divided."""
+    """Over fifteen orders the rig is its stuck springs, without loss of terms or division."""
     problem = rig()
     for force in (1.0, 1e-6, 1e-15):
         solution = problem.solve(100.0, force)
@@ -221,7 +221,7 @@ def test_a_force_that_falls_to_nothing_leaves_the_linear_answer():
 
 @pytest.mark.parametrize("closer", [0.0, 1e-9, -1e-9, 1e-4, -1e-4, 1e-2])
 def test_a_contact_that_is_only_just_touched(closer):
-    """The gap is the amplitude of the free motion, or less by a share: the answer is continuous.
+    """The response is continuous for a gap equal to the free amplitude or slightly less.
 
     At 20 Hz, a fifth of the first natural frequency, the mass moves as it is pushed.
     """
@@ -261,9 +261,9 @@ def pair(harmonics, samples):
 
 @pytest.mark.parametrize("held", [slow(0.0), KT])
 def test_the_third_harmonic_in_resonance_with_the_second_mode(held):
-    """Right with enough harmonics; one alone says what it leaves out, and more are found if asked.
+    """Enough harmonics are exact; one reports what it leaves out, and more are found if asked.
 
-    With the joint free ω2 = 3 ω1: both modes are shaken at once where the joint slips far.
+    With the joint free ω2 = 3 ω1: both modes are excited at once where the joint slips far.
     """
     model = pair((1,), 64).model
     modes = natural_frequencies(model)
@@ -303,7 +303,7 @@ def test_the_third_harmonic_in_resonance_with_the_second_mode(held):
 
 @pytest.mark.parametrize("frequency", [np.nan, np.inf, -100.0, 0.0])
 def test_frequencies_that_are_none_are_refused(frequency):
-    """At 0 Hz all harmonics are one: there is no cycle."""
+    """At 0 Hz all harmonics coincide, so there is no cycle."""
     with pytest.raises(HarmonicBalanceError, match="give a finite number above 0"):
         rig().solve(frequency, 60.0)
 
@@ -327,9 +327,9 @@ def test_spans_that_are_none_are_refused(span):
 
 
 def test_a_force_that_is_never_reached_is_no_solution():
-    """Shaken by 2.5 times its weight the body would be thrown about: raising the force turns back.
+    """Shaken by 2.5 times its weight the body would be thrown about: raising the force fails.
 
-    By way of the free vibration, which nothing damps, it would go round for ever.
+    Along the undamped free vibration, it would otherwise continue for ever.
     """
     model = body(normal=0.0)
     problem = balance(model, contact(), {"x": 1.0, "z": 20.0}, 8.0, highest=11, samples=512)

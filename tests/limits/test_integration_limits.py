@@ -1,4 +1,4 @@
-"""Where integration in time is at its limits: stuck, apart, and steps far too large."""
+"""Limits of integration in time: stuck, apart, and steps far too large."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ RIG = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3), 1e-3)
 
 @dataclass(frozen=True)
 class Elastic:
-    """A joint without memory: its force and its slope are functions of its displacement."""
+    """Joint without memory, whose force and slope are functions of its displacement."""
 
     force: object
     slope: object
@@ -43,7 +43,7 @@ class Elastic:
 
 
 def stop(stiffness, gap):
-    """A spring that is touched at a gap."""
+    """Return a spring that is touched at a gap."""
     return Elastic(
         lambda u: stiffness * np.maximum(u - gap, 0.0),
         lambda u: np.where(u > gap, stiffness, 0.0),
@@ -51,7 +51,7 @@ def stop(stiffness, gap):
 
 
 def test_a_stuck_start_is_linear():
-    """A slider that never reaches its limit is its spring: same motion, nothing dissipated."""
+    """A slider that never reaches its limit is a spring: same motion, nothing dissipated."""
     start = Start(np.array([1e-3, 0.9e-3]))
     control = TimeStepControl(1e-4)
     stuck = integrate(RIG, Jenkins(27.3e3, 0.5, 1e6), None, 0.1, control, start)
@@ -70,7 +70,7 @@ def test_a_stuck_start_is_linear():
 
 
 def test_a_start_at_the_limit_slips_or_sticks_as_it_is_pushed():
-    """Led to 10 times its reach: the spring is at its limit, and comes back in stick."""
+    """Moved to 10 times its reach, the spring is at its limit, and returns in stick."""
     start = Start(np.array([0.0, 0.01]), np.array([0.0, 5.0]))
     joints = SliderJoints(np.array([27.3e3]), np.array([27.3]), np.array([880.0]))
     exact = integrate_exactly(RIG, joints, None, 0.01, 1e-5, start)
@@ -84,7 +84,7 @@ def test_a_start_at_the_limit_slips_or_sticks_as_it_is_pushed():
 
 
 def test_without_normal_load_nothing_is_held():
-    """A slider without a limit, a contact that stays apart and no joint at all are the same."""
+    """A slider without a limit, a contact that stays apart and no joint at all are equal."""
     blow = HammerBlow(unit_force(RIG, "m1"), 100.0, 1e-3)
     free = integrate(RIG, None, blow, 0.05, TimeStepControl(1e-4))
     loose = integrate(RIG, Jenkins(27.3e3, 0.5, 0.0), blow, 0.05, TimeStepControl(1e-4))
@@ -101,10 +101,10 @@ def test_without_normal_load_nothing_is_held():
 
 @pytest.mark.parametrize("parts", [20, 57, 160])
 def test_a_body_hits_a_stop_and_comes_back(parts):
-    """Free flight, half a period on the stop, and back with the same speed.
+    """It flies freely, spends half a period on the stop, and returns with the same speed.
 
-    To O(h²) with a factor that depends on where in a step it touches: 0.3 to 0.6 gaps at steps of
-    1/20 to 1/320 of the time on the stop.
+    The error is O(h²) with a factor that depends on the position of the hit in a step: 0.3 to 0.6
+    gaps at steps of 1/20 to 1/320 of the time on the stop.
     """
     mass, stiffness, gap, speed = 1e-3, 4e3, 0.3, 100.0
     body = lumped_rig({"m": mass}, {}, [[Link("m")]])
@@ -123,7 +123,7 @@ def test_a_body_hits_a_stop_and_comes_back(parts):
 
 
 def test_a_contact_that_lifts_off_and_slides_is_followed():
-    """Three directions, apart most of the time; energy balances, and a finer step agrees."""
+    """It is apart most of the time in three directions; energy balances; finer steps agree."""
     rig = lumped_rig(
         dict.fromkeys("xyz", 1e-3),
         {Link("x"): 300.0, Link("y"): 200.0, Link("z"): 100.0},
@@ -151,7 +151,7 @@ def test_a_contact_that_lifts_off_and_slides_is_followed():
 
 
 def softening(peak, stiffness, fall):
-    """A spring that lets go: up to its peak, then down to nothing."""
+    """Return a spring that softens: force up to its peak, then down to zero."""
     reach = peak / stiffness
 
     def force(u):
@@ -167,7 +167,7 @@ def softening(peak, stiffness, fall):
 
 
 def test_a_joint_that_lets_go_is_followed_in_parts_of_a_step():
-    """Pulled slowly over its peak it falls so fast that Newton fails in a step; in halves not."""
+    """Pulled slowly over its peak it falls so fast that Newton needs halved steps."""
     body = lumped_rig({"m": 1e-3}, {Link("m"): 50.0}, [[Link("m")]], 0.05)
     law = softening(20.0, 1000.0, 2e4)
     pull = RecordedForce(np.ones(1), np.array([0.0, 0.1]), np.array([0.0, 25.0]))
@@ -183,7 +183,7 @@ def test_a_joint_that_lets_go_is_followed_in_parts_of_a_step():
 
 @pytest.mark.parametrize("stiffness", [1e7, 1e10])
 def test_a_joint_far_stiffer_than_a_step_resolves(stiffness):
-    """Every reversal falls within a step: plain Newton would jump between the two directions."""
+    """Every reversal falls within a step: plain Newton would jump between both directions."""
     force = HarmonicForce(unit_force(RIG, "m1"), 75.0, 30.0)
     stiff = Jenkins(stiffness, 0.5, 60.0)
     coarse = integrate(RIG, stiff, force, 0.2, TimeStepControl(1e-3))
@@ -197,7 +197,7 @@ def test_a_joint_far_stiffer_than_a_step_resolves(stiffness):
 
 @pytest.mark.parametrize("step", [0.02, 1.0])
 def test_a_step_far_too_large_says_how_wrong_it_is(step):
-    """Ten and five hundred periods in a step: bounded, since the rule is stable, and useless."""
+    """With 10 or 500 periods in a step the result is bounded (stable rule), but useless."""
     force = HarmonicForce(unit_force(RIG, "m1"), 75.0, 33.0)
     law = Jenkins(27.3e3, 0.5, 60.0)
     fixed = integrate(RIG, law, force, 20.0 * step, TimeStepControl(step))

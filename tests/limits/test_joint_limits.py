@@ -1,4 +1,4 @@
-"""Joints at rest, over steps that take in many amplitudes, and with no preload left."""
+"""Tests of joints at rest, over very large steps, and without preload."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def lead(law, displacement, state=None, start=0.0):
 
 @EVERY
 def test_fully_stuck_start(law):
-    """From rest every law is its spring, whatever the direction, and loses nothing by it."""
+    """From rest every law is its spring in any direction, and dissipates nothing."""
     whole = law.stiffness + (0.0 if isinstance(law, BoucWen) else RESIDUAL)
     still = law.respond(law.rest(1), np.zeros((1, 1)))
     assert still.tangent[0, 0, 0] == whole
@@ -47,7 +47,7 @@ def test_fully_stuck_start(law):
 
 @EVERY
 def test_a_step_far_too_large_is_right(law):
-    """One increment over a thousand reaches, out of a history of nested loops, and back."""
+    """One increment spans a thousand reaches, from a history of nested loops, and back."""
     path = REACH * np.random.default_rng(RNG_SEED).uniform(-1.0, 1.0, 50)
     state, start = lead(law, path).state, path[-1]
     far = 1000.0 * REACH
@@ -74,7 +74,7 @@ def test_a_step_beyond_all_measure_stays_finite(law):
 @EVERY
 @pytest.mark.parametrize("load", [0.0, 1e-300])
 def test_preload_worn_to_nothing(law, load):
-    """Only the residual slope is left, in any state; what the spring held is lost at most once."""
+    """Only the residual slope remains in any state; the spring's energy is lost at most once."""
     worn = replace(law, normal_load=load)
     path = REACH * np.random.default_rng(RNG_SEED).uniform(-3.0, 3.0, 30)
     for state, start in ((law.rest(1), 0.0), (lead(law, path).state, path[-1])):

@@ -1,4 +1,4 @@
-"""Materials up to the ends of what is possible: ν from 0 to 0.5, moduli 1 : 1000 and rigid."""
+"""Tests of extreme materials: ν from 0 to 0.5, moduli 1 : 1000 and rigid."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ POISSON = [0.0, 0.3, 0.499, 0.5]
 
 
 def sphere(pair, cells=48, friction=FRICTION):
-    """A contact over two thirds of the grid, and its states under P, then also under Qx = µP/2."""
+    """Return a contact over two thirds of the grid, and its states under P and Qx = µP/2."""
     hertz = HertzSphere(P, RADIUS, pair.contact_modulus)
     size = 3.0 * hertz.contact_radius
     grid = Grid.covering((size, size), (cells, cells))
@@ -36,7 +36,7 @@ def test_poissons_ratio_scales_a_contact_of_equal_bodies(poisson):
     """Approach is Hertz's with E* to 1e-3, at 16 cells in the contact radius.
 
     With so much friction that hardly any cell slips, the shift is Q Σ(2-ν)/G / 8a (Mindlin 1949,
-    exact for every ν), to 1 %: the singular edge leaves half a cell.
+    exact for every ν), to 1 %: the singular edge causes an error of half a cell.
     """
     body = Material(70e3, poisson)
     friction, Q = 1e4, 1.0
@@ -50,7 +50,7 @@ def test_poissons_ratio_scales_a_contact_of_equal_bodies(poisson):
 
 @pytest.mark.parametrize("poisson", POISSON)
 def test_a_rigid_ball_couples_less_the_less_compressible_its_partner(poisson):
-    """β = (1-2ν)/2(1-ν) against a rigid body: 0.5 at ν = 0, and 0 at 0.5, where nothing couples."""
+    """β = (1-2ν)/2(1-ν) against a rigid body is 0.5 at ν = 0, and 0 at 0.5 (uncoupled)."""
     body = Material(70e3, poisson)
     pair = ElasticPair(Material(np.inf, 0.3), body)
     assert pair.dundurs_beta == pytest.approx((1 - 2 * poisson) / (2 - 2 * poisson))
@@ -63,7 +63,7 @@ def test_a_rigid_ball_couples_less_the_less_compressible_its_partner(poisson):
 
 
 def test_nearly_incompressible_is_close_to_incompressible():
-    """β falls in proportion to 1 - 2ν, and shear under pressure alone with it."""
+    """β falls in proportion to 1 - 2ν, and so does shear under pressure alone."""
     largest = []
     for poisson in (0.49, 0.499, 0.4999):
         pair = ElasticPair(Material(np.inf, 0.3), Material(70e3, poisson))
@@ -101,7 +101,7 @@ def test_a_thousand_times_stiffer_is_almost_rigid(stiffer):
 
 
 def test_bodies_that_are_almost_alike_are_solved_as_if_they_were():
-    """Between the two solvers, uncoupled and coupled, there is no jump."""
+    """There is no jump between the two solvers, uncoupled and coupled."""
     alike = Material(70e3, 0.3)
     results = []
     for other in (alike, Material(70e3, 0.3 + 1e-9)):

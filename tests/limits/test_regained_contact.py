@@ -1,7 +1,7 @@
-"""Contact lost and regained within a history: friction forgets at P = 0, and only there.
+"""Contact that is lost and regained within a history: friction forgets only at P = 0.
 
-An unloaded contact keeps the shear that its last reversal locked in; bodies apart keep nothing, and
-touch again as if they never had.
+An unloaded contact keeps the shear that its last reversal locked in; separated bodies keep nothing,
+and touch again as if for the first time.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ from wear.steps.full_cycle import march_cycle
 
 
 def follow(contact, height, *loads):
-    """The last state under (P, Qx), one after the other."""
+    """Return the last of the states under consecutive (P, Qx)."""
     state = contact.apart(height)
     for load in loads:
         values = np.array([load[0], load[1], 0.0, 0.0, 0.0, 0.0])
@@ -44,8 +44,11 @@ def test_while_pressed_it_remembers_as_in_mindlins_solution():
 
 @pytest.mark.parametrize(("left", "trace"), [(0.5, True), (0.3, True), (0.2, False), (1e-3, False)])
 def test_a_load_that_falls_far_enough_forgets_too(left, trace):
-    """Where the contact that is left, a (P'/P)^(1/3), lies within what never slipped, c = a (1 -
-    Q/µP)^(1/3), nothing has moved there and no shear is locked in: below P' = P - Q/µ."""
+    """Below P' = P - Q/µ the remaining contact lies within the zone that never slipped.
+
+    With a contact radius a (P'/P)^(1/3) below c = a (1 - Q/µP)^(1/3), nothing has moved there and
+    no shear is locked in.
+    """
     contact, height = sphere("alike", 48)
     assert trace == (left > 1.0 - 30.0 / (FRICTION * P))
     fresh = follow(contact, height, (P, 0.0))
@@ -76,7 +79,7 @@ def test_bodies_that_part_touch_again_as_new(kind):
 
 @BOTH
 def test_a_bulk_strain_while_apart_is_not_felt(kind):
-    """What the surfaces stretch while they are apart shears nothing when they touch again."""
+    """Stretching the surfaces while they are apart causes no shear when they touch again."""
     contact, height = sphere(kind)
     fresh = follow(contact, height, (P, 0.0))
     state = contact.apart(height)
@@ -89,7 +92,7 @@ def test_a_bulk_strain_while_apart_is_not_felt(kind):
 
 @BOTH
 def test_motions_that_part_the_bodies_and_join_them(kind):
-    """The same by an approach that is taken back and imposed again."""
+    """The same holds for an approach that is reversed and imposed again."""
     contact, height = sphere(kind)
     depth = follow(contact, height, (P, 0.0)).rigid[0]
     state, states = contact.apart(height), []
@@ -107,7 +110,7 @@ def test_motions_that_part_the_bodies_and_join_them(kind):
 
 @pytest.mark.parametrize("kind", ["alike", slow("unlike")])
 def test_legs_are_not_taken_in_one_step_across_a_parting(kind):
-    """The short way through a history does not apply, and is not taken."""
+    """The short way through a history does not apply there, and is not used."""
     contact, height = sphere(kind, 16)
     values = np.zeros((6, 6))
     values[:, 0] = [P, P, 0.0, P, P, P]
@@ -161,10 +164,10 @@ def test_what_a_cycle_did_before_it_parted_does_not_matter_after(kind):
 
 
 def test_a_flat_that_sticks_dissipates_nothing_and_one_that_slides_does():
-    """Shear and pressure of a flat punch are alike in shape: all of it sticks up to Q = µP.
+    """Shear and pressure of a flat punch have the same shape: all of it sticks up to Q = µP.
 
-    Complete contact of like bodies, plane strain (Johnson 1985, section 7.2): below, no slip and
-    no energy but for the solver's tolerance; above, the energy given, and no other.
+    Complete contact of similar bodies, plane strain (Johnson 1985, section 7.2): below, no slip and
+    no energy except for the solver's tolerance; above, exactly the given energy.
     """
     grid = Grid.strips(2.0, 64)
     height = np.where(np.abs(grid.x) < 0.75, 0.0, 1.0)

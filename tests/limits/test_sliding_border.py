@@ -21,7 +21,7 @@ from tests.limits.scenes import ALIKE, BOTH, FRICTION, PAIRS, RADIUS, SOLVED, P,
 
 
 def cylinder(kind, cells=128):
-    """A line contact that takes two thirds of its grid under P, and its gap."""
+    """Return a line contact that takes two thirds of its grid under P, and its gap."""
     pair = PAIRS[kind]
     half = np.sqrt(4.0 * P * RADIUS / (np.pi * pair.contact_modulus))
     grid = Grid.strips(3.0 * half, cells)
@@ -29,7 +29,7 @@ def cylinder(kind, cells=128):
 
 
 def pressed_on(scene, kind, *cells):
-    """The contact of a scene, its gap, and the state under P."""
+    """Return the contact of a scene, its gap, and the state under P."""
     contact, height = scene(kind, *cells)
     return contact, height, contact.advance(contact.apart(height), height, load())
 
@@ -85,7 +85,7 @@ def test_the_stick_zone_closes_as_in_mindlins_solution():
 
 @pytest.mark.parametrize("off", [-1e-10, -1e-13, 0.0, 1e-13])
 def test_at_the_limit_rounding_does_not_choose_a_motion(off):
-    """With Poisson's ratio no motion is long enough at Q = µP: it was 10 mm for a radius of 0.1."""
+    """With Poisson's ratio no motion suffices at Q = µP; it once was 10 mm for a radius of 0.1."""
     grid = Grid.covering((0.6, 0.6), (32, 32))
     steel = Material(200e3, 0.3)
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(steel, steel)), 0.3)
@@ -145,9 +145,10 @@ def test_without_friction_no_shear_force_at_all(kind):
 
 
 def grid_limit(contact, height):
-    """Σ µp r S: the moment of friction on the cells, all turning about the middle.
+    """Return Σ µp r S: the moment of friction on the cells, all turning about the middle.
 
-    The pressure is that without friction, for unlike bodies too: shear along circles lifts nothing.
+    The pressure is that without friction, also for dissimilar bodies: shear along circles lifts
+    nothing.
     """
     grid = contact.grid
     pressure = NormalContact(contact.half_space).solve(height, P).pressure
@@ -155,16 +156,16 @@ def grid_limit(contact, height):
 
 
 def test_the_limit_of_the_moment_is_that_of_hertz():
-    """3πµPa/16, to 1e-3 at 21 cells across the radius (midpoint rule of √ at the edge)."""
+    """It is 3πµPa/16, to 1e-3 at 21 cells across the radius (midpoint rule of √ at the edge)."""
     contact, height, _ = pressed_on(sphere, "alike", 64)
     exact = TwistedSphere(P, RADIUS, ALIKE, ALIKE, FRICTION)
     assert grid_limit(contact, height) == pytest.approx(exact.sliding_moment, rel=1e-3)
 
 
 def test_below_the_largest_moment_the_twist_is_lubkins():
-    """At 0.99 of it, where the stick radius is 5 cells: twist to 1 %, shear to 1 % of µp0 (rms).
+    """At 0.99 of it, with a stick radius of 5 cells: twist to 1 %, shear to 1 % of µp0 (rms).
 
-    Single cells at the kink of the stick radius are off by 4 %; with twice the cells all is half.
+    Single cells at the kink of the stick radius are off by 4 %; twice the cells halve all errors.
     """
     contact, height, pressed = pressed_on(sphere, "alike", 64)
     exact = TwistedSphere(P, RADIUS, ALIKE, ALIKE, FRICTION)
@@ -187,7 +188,7 @@ def test_below_the_largest_moment_the_twist_is_lubkins():
 
 @pytest.mark.parametrize("distance", [1e-2, 1e-4])
 def test_the_border_of_the_moment_is_sharp(distance):
-    """On a centred contact the cells' own limit is exact: the slip velocity is a rotation."""
+    """For a centred contact the cells' own limit is exact: the slip velocity is a rotation."""
     contact, height, pressed = pressed_on(sphere, "alike")
     limit = grid_limit(contact, height)
     inside = contact.advance(pressed, height, load(Mz=(1.0 - distance) * limit))
@@ -199,8 +200,10 @@ def test_the_border_of_the_moment_is_sharp(distance):
 
 
 def test_unlike_bodies_share_that_border():
-    """A pressure that depends on shear is known when it has been found: then the moment is refused,
-    but not within 0.1 % of the border."""
+    """A pressure that depends on shear is known only once it has been found.
+
+    The moment is then refused, but not within 0.1 % of the border.
+    """
     contact, height, pressed = pressed_on(sphere, "unlike")
     limit = grid_limit(contact, height)
     given = load(Mz=0.999 * limit)

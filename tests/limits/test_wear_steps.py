@@ -40,10 +40,10 @@ def punch(grid: Grid) -> WearingContact:
 
 
 def unevenness(contact: WearingContact, kind: str, limits: float, steps: int) -> Array:
-    """How far the pressure of a rough punch is from uniform after each step ``(steps,)`` [MPa].
+    """Return how far a rough punch's pressure is from uniform after each step ``(steps,)`` [MPa].
 
-    Its shape under uniform pressure has worn in already: it would wear on evenly for ever. On it
-    lies a roughness of 0.01 nm.
+    The shape under uniform pressure has worn in already, and would wear evenly for ever. It carries
+    a roughness of 0.01 nm.
     """
     grid = contact.contact.grid
     rough = 1e-8 * np.random.default_rng(RNG_SEED).standard_normal(grid.shape)
@@ -71,14 +71,14 @@ def test_explicit_steps_are_stable_just_below_their_limit_and_unstable_just_abov
 @pytest.mark.parametrize("kind", ["implicit", "second_order"])
 @pytest.mark.parametrize("name", GRIDS)
 def test_other_steps_do_not_grow_at_a_hundred_times_that_limit(name, kind) -> None:
-    """Short waves go by 1 / (1 + 2 · 100) in the first step, longer ones more slowly."""
+    """Short waves shrink by 1 / (1 + 2 · 100) in the first step, longer ones more slowly."""
     sizes = unevenness(punch(GRIDS[name]), kind, 100.0, 3)
     assert np.all(sizes[1:] <= 0.5 * sizes[:-1]), sizes
 
 
 @pytest.mark.parametrize("kind", ["implicit", "second_order"])
 def test_no_checkerboard_and_no_growth_back(kind) -> None:
-    """A ball worn by 100 times the limit a step: alternate cells do not part."""
+    """A ball worn by 100 times the limit per step shows no difference of alternate cells."""
     grid = Grid.covering((4.0, 4.0), (32, 32))
     contact = punch(grid)
     ball = (grid.x**2 + grid.y**2) / 80.0
@@ -98,7 +98,7 @@ def test_no_checkerboard_and_no_growth_back(kind) -> None:
 @pytest.mark.parametrize("limits", [slow(0.5), slow(5.0), 100.0])
 @pytest.mark.parametrize("kind", ["implicit", "second_order"])
 def test_a_symmetric_problem_stays_symmetric_over_100_jumps(kind, limits) -> None:
-    """The sphere's four reflections, to 1e-8 of the depth."""
+    """The sphere's four reflections agree to 1e-8 of the depth."""
     grid = Grid.covering((4.0, 4.0), (16, 16))
     contact, state = punch(grid), WearState.unworn((grid.x**2 + grid.y**2) / 80.0)
     cycles = limits * contact.stable_cycles(state) / 10.0

@@ -1,4 +1,4 @@
-"""Wear up to a given depth, as of a coating, or to none: where a run must end."""
+"""Tests of wear up to a given depth, as of a coating, or without any: the end of a run."""
 
 import json
 
@@ -29,7 +29,7 @@ wear:
 stress: {section: none, life: {parameter: none}}
 output: {paraview: false, figures: false}
 """
-# Pressed, slid to and fro, apart.
+# Pressed, slid back and forth, apart.
 SLIDES = """\
 P, Qx, Qy, Mx, My, Mz, Edx, Edy
 100, 40, 0, 0, 0, 0, 0.5, 0
@@ -70,7 +70,7 @@ def run(folder, loads, *overrides):
     ],
 )
 def test_a_run_ends_at_its_depth_and_not_a_step_beyond(tmp_path, step):
-    """A step is shortened to what is left: past the depth by a hundredth of it at most."""
+    """The last step is shortened, so that the depth is met within a hundredth."""
     summary = run(tmp_path, SLIDES, f"wear.stop.depth={REACHED}", f"wear.step={step}")
     depth = max(summary["interface"]["depth_1"], summary["interface"]["depth_2"])
     assert depth == pytest.approx(REACHED, rel=0.01)
@@ -97,7 +97,7 @@ def test_a_depth_out_of_reach_ends_with_the_cycles(tmp_path):
 
 
 def test_a_contact_that_does_not_slip_wears_nothing_and_ends(tmp_path):
-    """Pressing alike bodies moves no point along the surface: no energy, no depth, no rates."""
+    """Pressing similar bodies moves no point along the surface: no energy, depth or rates."""
     step = "wear.step={kind: implicit, depth: 1 um}"
     summary = run(tmp_path, STICKS, f"wear.stop.depth={REACHED}", step)
     interface = summary["interface"]

@@ -1,4 +1,4 @@
-"""Wear models that are built and run in Python."""
+"""Tests of wear models that are built and run in Python."""
 
 import subprocess
 import sys
@@ -29,14 +29,14 @@ def script(name):
 
 @pytest.fixture
 def model():
-    """A cylinder that slides: four jumps of 500 cycles."""
+    """Return a cylinder that slides: four jumps of 500 cycles."""
     own = script("own_loads")
     wear = fretscale.Wear(2000.0, jump=fretscale.JumpSize(cycles=500.0))
     return fretscale.WearModel(own.Reciprocation(), own.contact, wear)
 
 
 class Interrupted(fretscale.Observer):
-    """Raise KeyboardInterrupt after so many jumps."""
+    """Observer that raises KeyboardInterrupt after some jumps."""
 
     def __init__(self, jumps):
         self.jumps = jumps
@@ -47,7 +47,7 @@ class Interrupted(fretscale.Observer):
 
 
 def test_the_default_dovetail_is_built_in_python():
-    """Equal models give equal numbers: a run depends on nothing else."""
+    """Equal models give equal numbers, so a run depends on nothing else."""
     assert script("dovetail_joint").model == wear_model(
         fretscale.load_case(CASES / "dovetail.yaml")
     )
@@ -75,7 +75,7 @@ def test_a_model_wears_as_its_case(tmp_path):
 
 
 def test_own_loads_wear_by_archard():
-    """V = K P s / H for each body, whatever the pressure: 50 N/mm over 80 um and 2000 cycles."""
+    """Each body loses V = K P s / H for any pressure: 50 N/mm over 80 um and 2000 cycles."""
     face = script("own_loads").model.run()["pad"]
     for body in (1, 2):
         worn = 1e-4 / 3000.0 * 50.0 * 0.08 * 2000.0

@@ -1,9 +1,9 @@
-"""Normal and tangential contact of dissimilar bodies adjusted to each other in turns.
+"""Normal and tangential contact of dissimilar bodies, solved alternately.
 
-The plain iteration of the papers: pressure for a given shear, then shear for that pressure, until
-the normal displacement under shear no longer changes. Where the contact slides, every round shrinks
-the change by about µβ (β of Dundurs): the iteration slows down towards µβ = 1 and fails beyond,
-where :mod:`sa_solver.dissimilar.contact` still converges.
+This is the plain iteration of the papers: pressure for a given shear, then shear for that pressure,
+until the normal displacement under shear no longer changes. Where the contact slides, every round
+reduces the change by about µβ (β of Dundurs): the iteration slows down towards µβ = 1 and fails
+beyond, where :mod:`sa_solver.dissimilar.contact` still converges.
 
 Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914.
 """
@@ -52,7 +52,7 @@ class AlternatingState:
 
 
 class AlternatingContact:
-    """The alternating iteration on one grid, with all resultants imposed."""
+    """Alternating iteration on one grid, with all resultants imposed."""
 
     def __init__(self, half_space: HalfSpace, friction: float) -> None:
         """Plan for ``half_space`` and the coefficient of friction µ."""
@@ -69,10 +69,10 @@ class AlternatingContact:
         tolerance: float = TOLERANCE,
         max_rounds: int = ROUNDS,
     ) -> AlternatingState:
-        """Solve one increment, given as to
-        :meth:`~sa_solver.dissimilar.contact.CoupledContact.solve`.
+        """Solve one increment, with the arguments of ``CoupledContact.solve``.
 
-        Raises what the normal and the tangential solver raise.
+        See :meth:`~sa_solver.dissimilar.contact.CoupledContact.solve`. Raises the exceptions of the
+        normal and the tangential solver.
         """
         loads = {
             name: float(value)
@@ -140,7 +140,7 @@ class AlternatingContact:
 
 
 def _change(lift: Array, last: Array, pressed: NormalState) -> float:
-    """Largest change in the contact over the largest displacement."""
+    """Return the largest change in the contact over the largest displacement."""
     moved = np.abs(lift - last)[pressed.pressure > 0.0].max(initial=0.0)
     return float(moved) / float(np.abs(pressed.displacement + lift).max())
 

@@ -1,4 +1,4 @@
-"""Springs of third order in the place of joints: harmonic balance has closed forms for them."""
+"""Cubic springs in place of joints, for which harmonic balance has closed forms."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class CubicCycle:
-    """A cycle of springs, which have no states and lose nothing.
+    """Cycle of springs, which have no states and dissipate nothing.
 
     See :class:`wear.joints.periodic.march.PeriodicMarch`.
     """
@@ -26,7 +26,7 @@ class CubicCycle:
 
 @dataclass(frozen=True)
 class CubicSprings:
-    """F = k u³ at every joint, ``stiffness`` [N/mm³]."""
+    """Springs with F = k u³ at every joint, ``stiffness`` [N/mm³]."""
 
     stiffness: float
     directions = 1

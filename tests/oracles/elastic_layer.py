@@ -18,7 +18,7 @@ LONGEST, SHORTEST, WAVES = 1e-3, 4e3, 20_000
 
 
 def softness(alpha: Array, stuck: float | None = None) -> Array:
-    """F at wave numbers over the thickness; ``stuck`` is ν of a layer that sticks to its base."""
+    """Return F at wave numbers over the thickness; ``stuck`` is ν of a layer that sticks."""
     alpha = np.minimum(alpha, 300.0)
     sinh, cosh = np.sinh(2.0 * alpha), np.cosh(2.0 * alpha)
     if stuck is None:
@@ -32,9 +32,9 @@ def softness(alpha: Array, stuck: float | None = None) -> Array:
 def layer_compliance(
     x: Array, spacing: float, modulus: float, depth: float, hats: bool, stuck: float | None = None
 ) -> Array:
-    """Displacement at ``x`` ``(n,)`` [mm] under 1 MPa at each of them ``(n, n)`` [mm/MPa].
+    """Return the displacement at ``x`` ``(n,)`` [mm] under 1 MPa at each ``(n, n)`` [mm/MPa].
 
-    Pressure there is a hat over two spacings, or a strip one wide; ``modulus`` is E* [MPa], and
+    The pressure is a hat over two spacings, or a strip one wide; ``modulus`` is E* [MPa], and
     ``stuck`` as for :func:`softness`.
     """
     edges = np.geomspace(LONGEST, SHORTEST, WAVES + 1)
@@ -47,7 +47,7 @@ def layer_compliance(
 
 
 def press(compliance: Array, gap: Array, widths: Array, load: float) -> Array:
-    """Pressure ``(n,)`` [MPa] of a rigid body that is pressed on with ``load`` [N/mm]."""
+    """Return the pressure ``(n,)`` [MPa] of a rigid body pressed with ``load`` [N/mm]."""
     pressed = np.ones(len(gap), dtype=bool)
     while True:
         count = int(pressed.sum())

@@ -1,10 +1,10 @@
-"""Structures with joints of one spring and one slider each, integrated exactly: a reference.
+"""Exact integration of structures with joints of one spring and one slider each, as a reference.
 
-As long as no joint changes between stick and slip the structure is linear: a stuck joint is its
+While no joint changes between stick and slip, the structure is linear: a stuck joint is its
 spring and the constant force -kt s of its slider at s, a slipping one the constant ± limit. It is
 moved by matrix exponentials from one event to the next. Stick ends where the spring reaches the
-limit, slip where the joint stops; both are located to rounding. Only rounding is left; the price is
-some matrix exponentials per event.
+limit, slip where the joint stops; both are located to rounding. Only rounding errors remain; the
+cost is some matrix exponentials per event.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from sa_solver.types import Array
 from tests.oracles.linear_flow import Layout, LinearFlow, unknowns
 from tests.oracles.signals import breaks, signal_at, single_forces
 
-# Events are looked for in parts of a step, this many in the shortest period: whatever is watched
-# then has one extremum in a part at most.
+# Events are searched in parts of a step, this many in the shortest period, so that each watched
+# quantity has at most one extremum in a part.
 PARTS = 20
-# What passes zero by less than this share of its own terms has not passed: rounding.
+# A passage through zero by less than this share of the quantity's terms is rounding.
 ROUNDING = 1e-13
 # A break this close to the end of a step, as a share of the step, is at its end: rounding.
 SAME = 1e-9
-# Changes of state in one part of a step; with more, joints change to and fro without moving.
+# Largest number of changes of state in a part of a step; with more, joints switch without moving.
 MAX_EVENTS = 100
 
 
 @dataclass(frozen=True)
 class SliderJoints:
-    """Joints of one direction: a spring in series with a slider, and a spring beside them.
+    """Joints of one direction: a spring in series with a slider, and a parallel spring.
 
     ``stiffness`` kt and ``residual_stiffness`` kr [N/mm] of the springs, ``limit`` [N] of the
     slider, all ``(j,)``. Raises ``ValueError`` unless kt > 0 and the others are 0 or more.
@@ -65,11 +65,11 @@ def integrate_exactly(
     step: float,
     start: Start | None = None,
 ) -> Motion:
-    """Motion at multiples of ``step`` [s] until the first at or after ``duration``.
+    """Return the motion at multiples of ``step`` [s] until the first at or after ``duration``.
 
-    A ``joint_state`` ``(j, 1)`` is where the sliders are [mm]; sliders that a start would leave
-    beyond their limit have slipped to it. A motion that could not be found to the end says so.
-    Raises ``ValueError`` if the joints are not as many as the rows of the connection.
+    A ``joint_state`` ``(j, 1)`` holds the slider positions [mm]; sliders that a start would leave
+    beyond their limit have slipped to it. An incomplete motion is marked as such. Raises
+    ``ValueError`` if the number of joints differs from the rows of the connection.
     """
     if len(joints.stiffness) != len(model.connection):
         raise ValueError(
@@ -90,7 +90,7 @@ def integrate_exactly(
 
 
 class _Row(NamedTuple):
-    """What is kept of a time; energies are those brought in, damped and lost in each joint."""
+    """Stored values of a time, with the energies supplied, damped and lost in each joint."""
 
     motion: Array
     joint_force: Array
@@ -98,7 +98,7 @@ class _Row(NamedTuple):
 
 
 class _Run:
-    """The state on its way, and the energies so far."""
+    """Current state of the integration, and the energies so far."""
 
     def __init__(
         self,
@@ -126,7 +126,7 @@ class _Run:
 
     @property
     def sliders(self) -> Array:
-        """Where the sliders are ``(j, 1)`` [mm]."""
+        """Positions of the sliders ``(j, 1)`` [mm]."""
         return (self._stretch() - self._spring_force() / self._joints.stiffness)[:, None]
 
     def row(self) -> _Row:
@@ -134,7 +134,7 @@ class _Run:
         return _Row(self._motion, self._spring_force() + residual, self._energies.copy())
 
     def advance(self, time: float) -> None:
-        """One step from a time on, in parts between breaks of the excitation."""
+        """Advance one step from a time, in parts between breaks of the excitation."""
         margin, end = SAME * self._step, time + self._step
         inside = self._breaks[(self._breaks > time + margin) & (self._breaks < end - margin)]
         for first, last in pairwise([time, *inside.tolist(), end]):
@@ -181,7 +181,7 @@ class _Run:
     def _first_event(
         self, flow: LinearFlow, layout: Layout, y: Array, after: Array, left: float
     ) -> tuple[float, tuple[int, float] | None]:
-        """When the first joint changes its state, which, and in which direction; None: not yet."""
+        """Return when the first joint changes its state, with joint and direction; None if none."""
         first: tuple[float, tuple[int, float] | None] = (left, None)
         for joint, slip in enumerate(self._slip):
             for direction in (1.0, -1.0) if slip == 0.0 else (slip,):
@@ -192,9 +192,9 @@ class _Run:
         return first
 
     def _watch(self, joint: int, direction: float, layout: Layout) -> tuple[Array, float]:
-        """A row and an offset; with y they are above zero where a joint must change its state.
+        """Return a row and an offset that are positive with y where a joint must change its state.
 
-        A stuck one is beyond its limit, or a slipping one moves back.
+        A stuck joint is then beyond its limit, or a slipping one moves back.
         """
         row = np.zeros(layout.total)
         stretch = direction * self._model.connection[joint]
@@ -216,7 +216,7 @@ class _Run:
             self._constant[joint] = limit - stiffness * self._stretch()[joint]
 
     def _account(self, layout: Layout, before: Array, after: Array, powers: Array) -> None:
-        """Go on to where a part of the way has led, and add its energies."""
+        """Advance to the end of a part of the step, and add its energies."""
         stretch = self._stretch()
         self._motion = after[: 2 * layout.size]
         lost = self._slip * self._joints.limit * (self._stretch() - stretch)
@@ -224,7 +224,7 @@ class _Run:
         self.steps += 1
 
     def stored(self, stretch: Array, force: Array) -> Array:
-        """What the joints' springs hold more than at the first of the times ``(t,)`` [N mm].
+        """Return the joint springs' energy above that at the first of the times ``(t,)`` [N mm].
 
         ``stretch`` and ``force`` ``(t, j)``.
         """
@@ -252,14 +252,14 @@ class _Run:
 
 @dataclass(frozen=True)
 class _Watched:
-    """``row`` y + ``offset``, which passes zero upwards where a joint changes its state."""
+    """Quantity ``row`` y + ``offset``, which passes zero upwards where a joint changes state."""
 
     flow: LinearFlow
     row: Array
     offset: float
 
     def first_passage(self, y: Array, after: Array, length: float) -> float | None:
-        """When it passes zero on the way from ``y`` to ``after``, None if it does not."""
+        """Return when it passes zero on the way from ``y`` to ``after``, None if it does not."""
         rounding = ROUNDING * max(self._terms(y), self._terms(after))
         end = length
         if self._value(after) <= rounding:
@@ -288,7 +288,7 @@ class _Watched:
         return float(np.abs(self.row) @ np.abs(y)) + abs(self.offset)
 
     def _root(self, y: Array, form: Callable[[Array], float], low: float, high: float) -> float:
-        """Where a form is zero between two times at which its signs differ, to rounding."""
+        """Return the zero of a form between two times at which its signs differ, to rounding."""
 
         def at(time: float) -> float:
             return form(self.flow.after(time, y))

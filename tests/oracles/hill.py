@@ -20,9 +20,9 @@ from sa_solver.types import Array
 def hill_multipliers(
     problem: HarmonicBalance, motion: HarmonicSolution, highest: int, samples: int
 ) -> Array:
-    """exp(λT) of the exponents with the smallest imaginary parts ``(2 n,)``, by size.
+    """Return exp(λT) of the exponents with the smallest imaginary parts ``(2 n,)``, by size.
 
-    Of joints along one direction; deviations have all harmonics up to the ``highest``.
+    Joints act along one direction; deviations have all harmonics up to the ``highest``.
     """
     every = Resolution(tuple(range(highest + 1)), samples)
     coefficients = every.adopt(motion.coefficients, motion.resolution)

@@ -1,10 +1,10 @@
-"""A linear structure under lines and harmonics, moved exactly by matrix exponentials: y' = A y.
+"""Linear structure under lines and harmonics, integrated exactly by exponentials: y' = A y.
 
     y = (x, v, c, w)
 
-holds displacements and velocities ``(n,)``, constant joint forces c ``(j,)``, and of each force
-what it needs to go on, w: the value and the slope of its line, then the sine and the cosine of each
-of its waves. Energies are integrals of quadratic forms in y and exponentials too
+holds displacements and velocities ``(n,)``, constant joint forces c ``(j,)``, and the state w of
+each force: the value and the slope of its line, then the sine and the cosine of each of its waves.
+Energies are integrals of quadratic forms in y and are given by exponentials too
 (Van Loan 1978, IEEE Transactions on Automatic Control 23, 395).
 """
 
@@ -24,7 +24,7 @@ from tests.oracles.signals import Signal
 
 @dataclass(frozen=True)
 class Layout:
-    """Places in y of ``size`` displacements, ``joints`` and forces.
+    """Positions in y of ``size`` displacements, ``joints`` and forces.
 
     ``waves`` are the angular frequencies [rad/s] of each force.
     """
@@ -47,7 +47,7 @@ class Layout:
 
     @property
     def forces(self) -> list[slice]:
-        """One for each force."""
+        """Slices of y, one for each force."""
         return [slice(first, last) for first, last in pairwise(self._ends)]
 
     @property
@@ -63,7 +63,7 @@ class Layout:
 
 
 class LinearFlow:
-    """The system of one layout, with springs ``held`` ``(j,)`` [N/mm] in place of the joints.
+    """System of one layout, with springs ``held`` ``(j,)`` [N/mm] in place of the joints.
 
     ``shapes`` ``(n,)`` are those of the forces.
     """
@@ -93,17 +93,17 @@ class LinearFlow:
         self._known: dict[float, tuple[Array, Array]] = {}
 
     def rate(self, y: Array) -> Array:
-        """A y."""
+        """Return A y."""
         return np.asarray(self._generator @ y)
 
     def after(self, time: float, y: Array) -> Array:
-        """y after a time [s]."""
+        """Return y after a time [s]."""
         return np.asarray(sl.expm(self._generator * time) @ y)
 
     def over(self, time: float, *, known: bool = False) -> tuple[Array, Array]:
-        """exp(A t), and the forms ``(2, N, N)`` of the energy brought in and damped meanwhile.
+        """Return exp(A t), and the forms ``(2, N, N)`` of the energy supplied and damped meanwhile.
 
-        They are kept if the time will be asked for again: ``known``.
+        They are stored if the time will be needed again: ``known``.
         """
         if time in self._known:
             return self._known[time]
@@ -120,7 +120,7 @@ class LinearFlow:
 
 
 def unknowns(layout: Layout, motion: Array, signals: Sequence[Signal], time: float) -> Array:
-    """y ``(N,)`` at a time, without constant joint forces, of a ``motion`` ``(2 n,)``."""
+    """Return y ``(N,)`` of a ``motion`` ``(2 n,)`` at a time, without constant joint forces."""
     y = np.zeros(layout.total)
     y[: len(motion)] = motion
     for place, signal in zip(layout.forces, signals, strict=True):

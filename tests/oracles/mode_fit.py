@@ -19,7 +19,7 @@ HALF_POWER = 0.5
 
 @dataclass(frozen=True)
 class Resonance:
-    """A peak of a frequency response.
+    """Peak of a frequency response.
 
     ``frequency`` [Hz] and ``magnitude`` (of the response's quantity) of the peak, and, of the mode
     fitted to it, ``natural_frequency`` [Hz] without damping and ``damping_ratio``.
@@ -34,13 +34,13 @@ class Resonance:
 def resonances(
     response: FrequencyResponse, lowest: float = 0.0, highest: float = np.inf, share: float = 0.05
 ) -> list[Resonance]:
-    """Resonances from ``lowest`` to ``highest`` [Hz], by frequency.
+    """Return resonances from ``lowest`` to ``highest`` [Hz], by frequency.
 
-    Peaks that stand out by ``share`` of the highest one. To the samples above half power, or three,
-    of each a mode and what other modes add to it is fitted: with s = σ + iω,
-    H (s² + 2ζω0 s + ω0²) = b0 + b1 s + b2 s² by least squares (Levy 1959, IRE Trans. Autom.
-    Control 4, 37), exact for a single mode beside a constant. A joint struck out of its linear
-    range has no mode, and its fit may be none (NaN).
+    Peaks must stand out by ``share`` of the highest one. A mode and a contribution of other modes
+    are fitted to the samples above half power, or three, of each: with s = σ + iω, H (s² + 2ζω0 s +
+    ω0²) = b0 + b1 s + b2 s² by least squares (Levy 1959, IRE Trans. Autom. Control 4, 37), exact
+    for a single mode plus a constant. A joint struck out of its linear range has no mode, and its
+    fit may not exist (NaN).
     """
     band = (response.frequency >= lowest) & (response.frequency <= highest)
     size = np.abs(response.value)
@@ -49,7 +49,7 @@ def resonances(
 
 
 def _resonance(response: FrequencyResponse, size: Array, peak: int) -> Resonance:
-    """The mode at sample ``peak``."""
+    """Return the mode at sample ``peak``."""
     near = _half_power(size, peak)
     # In units of the peak: response and frequency.
     reference = float(response.frequency[peak])
@@ -75,7 +75,7 @@ def _resonance(response: FrequencyResponse, size: Array, peak: int) -> Resonance
 
 
 def _half_power(size: Array, peak: int) -> slice:
-    """Samples about the peak above half power, at least its neighbours."""
+    """Return the samples about the peak above half power, at least its neighbours."""
     below = np.flatnonzero(size**2 < HALF_POWER * size[peak] ** 2)
     first = below[below < peak].max(initial=-1) + 1
     last = below[below > peak].min(initial=len(size)) - 1

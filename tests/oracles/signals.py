@@ -1,4 +1,4 @@
-"""Forces in time as what they are between their breaks: a straight line and harmonics."""
+"""Forces in time, described between their breaks as a straight line plus harmonics."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fe_models.dynamics.excitation import (
 
 @dataclass(frozen=True)
 class Wave:
-    """``amplitude`` sin(``angular`` t + ``phase``), with the angular frequency in rad/s."""
+    """Harmonic ``amplitude`` sin(``angular`` t + ``phase``), with ``angular`` in rad/s."""
 
     amplitude: float
     angular: float
@@ -27,7 +27,7 @@ class Wave:
 
 @dataclass(frozen=True)
 class Signal:
-    """A smooth stretch: ``value`` + ``slope`` (t - ``origin``) [N] and waves."""
+    """Smooth interval: ``value`` + ``slope`` (t - ``origin``) [N] and waves."""
 
     origin: float = 0.0
     value: float = 0.0
@@ -38,14 +38,14 @@ class Signal:
 def single_forces(
     excitation: ExcitationForce | CombinedForces | None,
 ) -> tuple[ExcitationForce, ...]:
-    """The forces that an excitation is the sum of."""
+    """Return the forces whose sum is an excitation."""
     if excitation is None:
         return ()
     return excitation.forces if isinstance(excitation, CombinedForces) else (excitation,)
 
 
 def breaks(excitation: ExcitationForce | CombinedForces) -> tuple[float, ...]:
-    """Times at which an excitation is not smooth, ascending."""
+    """Return the times at which an excitation is not smooth, ascending."""
     return tuple(sorted({time for force in single_forces(excitation) for time in _breaks(force)}))
 
 
@@ -61,7 +61,7 @@ def _breaks(force: ExcitationForce) -> tuple[float, ...]:
 
 
 def signal_at(force: ExcitationForce, time: float) -> Signal:
-    """The smooth stretch of a force around a time between two of its breaks."""
+    """Return the smooth interval of a force around a time between two of its breaks."""
     match force:
         case ConstantForce():
             return Signal(value=1.0)

@@ -1,8 +1,8 @@
-"""Archard wear of a body that slides over a flat without tilting: an independent small model.
+"""Independent small model of Archard wear for a body that slides over a flat without tilting.
 
 Dense half-planes (constant pressure on strips, Flamant), an active set for the contact, explicit
-steps in which all places of the stroke wear the surfaces at once. It shares nothing with the
-packages but the physics.
+steps in which all places of the stroke wear the surfaces at once. It shares only the physics with
+the packages.
 """
 
 import numpy as np
@@ -12,7 +12,10 @@ Array = NDArray[np.float64]
 
 
 def strip_compliance(count: int, pitch: float, modulus: float) -> Array:
-    """Displacement of strip i per pressure on strip j ``(n, n)``, but for a constant [mm/MPa]."""
+    """Return the displacement of strip i per pressure on strip j ``(n, n)`` [mm/MPa].
+
+    It is known up to a constant.
+    """
     apart = pitch * np.subtract.outer(np.arange(count), np.arange(count))
 
     def primitive(x: Array) -> Array:
@@ -23,7 +26,7 @@ def strip_compliance(count: int, pitch: float, modulus: float) -> Array:
 
 
 def press(compliance: Array, gap: Array, load: float, pitch: float) -> Array:
-    """Pressure ``(n,)`` of bodies that come straight together under ``load`` per length."""
+    """Return the pressure ``(n,)`` of bodies that approach straight under ``load`` per length."""
     touching = np.ones(len(gap), dtype=bool)
     for _ in range(100):
         on = np.flatnonzero(touching)
@@ -51,12 +54,13 @@ def wear_without_tilt(
     rate: float,
     steps: int,
 ) -> tuple[Array, Array]:
-    """Depths of the flat and of the slider after so many cycles' worth of ``steps``.
+    """Return the depths of the flat and of the slider after ``steps`` blocks of cycles.
 
-    The slider passes ``cells``, an even number, in each of the ``increments`` there and back, about
-    the middle. It presses where an increment ends, and either body loses ``rate`` [mm/MPa] times
-    that pressure from half an increment before that place to half an increment after it. The flat
-    is worn where the slider passes meanwhile: at the ends of that way half as much as between.
+    The slider passes ``cells``, an even number, in each of the ``increments`` forward and back,
+    about the middle. It presses where an increment ends, and either body loses ``rate`` [mm/MPa]
+    times that pressure from half an increment before that place to half an increment after it. The
+    flat is worn where the slider passes meanwhile: at the ends of that path half as much as
+    between.
     """
     compliance = strip_compliance(len(gap), pitch, modulus)
     half = cells * increments // 2

@@ -21,16 +21,16 @@ STEPS, MOST_SHOTS = 512, 12
 
 
 class Shot(NamedTuple):
-    """Multipliers by size, and how far the start is from where harmonics had it, as a share."""
+    """Multipliers by size, and the relative distance of the start from that of harmonic balance."""
 
     multipliers: Array
     distance: float
 
 
 def shoot(problem: HarmonicBalance, motion: HarmonicSolution, steps: int = STEPS) -> Shot | None:
-    """The motion near to one that has one joint and one harmonic of a load, or None.
+    """Return the motion near one with a single joint and load harmonic, or None.
 
-    A contact is seen at the end of one of so many ``steps``.
+    A contact is detected at the end of one of the ``steps``.
     """
     model, law = problem.model, problem.joints.law
     size, omega = len(model.mass), 2.0 * np.pi * motion.frequency

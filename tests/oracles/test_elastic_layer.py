@@ -1,4 +1,4 @@
-"""The layer's compliance against elasticity itself, and against the thin layers of the books."""
+"""Tests of the layer's compliance against the equations of elasticity and thin layers."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,10 @@ CONFINED, MODULUS = LAME + 2.0 * SHEAR, 1.0 / (1.0 - POISSON**2)
 
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 1.0, 2.0, 5.0])
 def test_softness_solves_the_equations_of_the_layer(alpha: float) -> None:
-    """u = U sin x, w = W cos x, τ = T sin x, σ = S cos x: an equation along z, from the base up."""
+    """With u = U sin x, w = W cos x, τ = T sin x, σ = S cos x an equation along z remains.
+
+    It is solved from the base up.
+    """
     rows = [
         [0.0, 1.0, 1.0 / SHEAR, 0.0],
         [-LAME / CONFINED, 0.0, 0.0, 1.0 / CONFINED],
@@ -34,7 +37,7 @@ def test_softness_solves_the_equations_of_the_layer(alpha: float) -> None:
     [(None, MODULUS), (POISSON, MODULUS * (1.0 - POISSON) ** 2 / (1.0 - 2.0 * POISSON))],
 )
 def test_thin_layers_press_as_the_books_say(stuck: float | None, confined: float) -> None:
-    """p = E' (a² - x²) / 2Rb and P = 2 E' a³ / 3Rb (Johnson 1985, section 5.8): b much below a.
+    """For b << a, p = E' (a² - x²) / 2Rb and P = 2 E' a³ / 3Rb (Johnson 1985, section 5.8).
 
     The half-width is off by a share of b, the largest pressure by less.
     """

@@ -1,4 +1,4 @@
-"""The accuracy reference against closed forms: a sliding oscillator and a blow on a linear one."""
+"""Tests of the exact integration against closed forms: a sliding oscillator, and a blow."""
 
 import numpy as np
 import pytest
@@ -21,11 +21,11 @@ def mass_on_springs(mass, stiffness, ratio=0.0):
 
 
 def sliding_decay(m, k, kt, limit, start, times):
-    """Free decay from ``start`` > limit/kt at rest, the spring at its limit: derived by hand.
+    """Return the free decay from ``start`` > limit/kt at rest with the spring at its limit.
 
-    A half swing is: stuck about xe = kt s/(k + kt), s the slider's place, until the spring has
-    turned round, x = start - 2 limit/kt; then slip about limit/k until it stops. The next half
-    swing is its mirror image. The last one never leaves stick.
+    Derived by hand. A half swing is: stuck about xe = kt s/(k + kt), s the slider's place, until
+    the spring has turned round, x = start - 2 limit/kt; then slip about limit/k until it stops. The
+    next half swing is its mirror image. The last one never leaves stick.
     """
     place, begin, sign = np.empty_like(times), 0.0, 1.0
     stuck, slipping = np.sqrt((k + kt) / m), np.sqrt(k / m)
@@ -70,7 +70,7 @@ def test_free_decay_with_a_slider_is_the_closed_form():
 
 
 def test_energy_balances_with_every_kind_of_force():
-    """Work, damping and friction are integrated apart; they meet to 1e-10."""
+    """Work, damping and friction are integrated separately and balance to 1e-10."""
     rig = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3), 0.01)
     first, second = unit_force(rig, "m1"), unit_force(rig, "m2")
     force = CombinedForces(
@@ -95,7 +95,7 @@ def test_energy_balances_with_every_kind_of_force():
 
 
 def half_sine_response(angular, ratio, peak, duration, times):
-    """Unit modal mass under half a sine from t = 0, by its particular and free solutions."""
+    """Return the response of unit modal mass to a half sine from t = 0, in closed form."""
     drive, damped = np.pi / duration, angular * np.sqrt(1.0 - ratio**2)
     real, imaginary = angular**2 - drive**2, 2.0 * ratio * angular * drive
     share = peak / (real**2 + imaginary**2)
@@ -114,7 +114,7 @@ def half_sine_response(angular, ratio, peak, duration, times):
 
 
 def blow_response(rig, shape, peak, duration, times):
-    """The linear rig under a blow, mode by mode ``(t, n)``."""
+    """Return the linear rig's response to a blow, mode by mode ``(t, n)``."""
     angular = 2.0 * np.pi * natural_frequencies(rig)
     # Modes of unit modal mass, from the closed form of the eigenvectors of two masses.
     modes = np.array([np.ones(2), (rig.stiffness[0, 0] - angular**2 * rig.mass[0, 0])])
@@ -138,7 +138,7 @@ def test_a_blow_on_a_free_rig_is_the_closed_form():
 
 
 def test_the_step_of_the_output_does_not_matter():
-    """Two joints, between masses and to ground, that slip at different times."""
+    """Two joints, between masses and to ground, slip at different times."""
     masses = {"a": 2e-3, "b": 1e-3}
     springs = {Link("a"): 400.0, Link("b", "a"): 900.0}
     rig = lumped_rig(masses, springs, [[Link("b")], [Link("b", "a")]], 0.01)

@@ -34,11 +34,11 @@ GreensFunction = Callable[[float, float], Array]
 def love_displacement(
     x: Array, y: Array, half_sides: tuple[float, float], contact_modulus: float
 ) -> Array:
-    """u_z per unit pressure on ``|x| <= a, |y| <= b`` [mm/MPa], Johnson's eq. 3.25.
+    """Return u_z per unit pressure on ``|x| <= a, |y| <= b`` [mm/MPa], Johnson's eq. 3.25.
 
-    ``x`` and ``y`` broadcast [mm], ``half_sides`` is (a, b) [mm], ``contact_modulus`` E* [MPa]. At
-    points on the lines that carry the rectangle's edges two of the logarithms are infinite or
-    cancel to nothing: not for those points.
+    ``x`` and ``y`` broadcast [mm], ``half_sides`` is (a, b) [mm], ``contact_modulus`` E* [MPa]. Do
+    not use it at points on the lines of the rectangle's edges, where two of the logarithms are
+    infinite or cancel to zero.
     """
     a, b = half_sides
     left, right, below, above = x - a, x + a, y - b, y + b
@@ -52,7 +52,7 @@ def love_displacement(
 
 
 def _log_ratio(top: Array, bottom: Array, other: Array) -> Array:
-    """``ln [(t + sqrt(t² + s²)) / (b + sqrt(b² + s²))]``."""
+    """Return ``ln [(t + sqrt(t² + s²)) / (b + sqrt(b² + s²))]``."""
     numerator = top + np.sqrt(top**2 + other**2)
     ratio: Array = np.log(numerator / (bottom + np.sqrt(bottom**2 + other**2)))
     return ratio
@@ -72,7 +72,7 @@ class UniformRectangle:
     body_2: Material
 
     def pressed(self, x: float, y: float) -> Array:
-        """Displacement per unit pressure at ``(x, y)`` [mm/MPa]."""
+        """Return the displacement per unit pressure at ``(x, y)`` [mm/MPa]."""
         normal = 1.0 / (np.pi * ElasticPair(self.body_1, self.body_2).contact_modulus)
         cross = _cross_compliance(self.body_1, self.body_2) / np.pi
 
@@ -83,7 +83,7 @@ class UniformRectangle:
         return _over_rectangle(kernel, x, y, self.half_sides)
 
     def sheared(self, x: float, y: float) -> Array:
-        """Displacement per unit shear along x at ``(x, y)`` [mm/MPa]."""
+        """Return the displacement per unit shear along x at ``(x, y)`` [mm/MPa]."""
         bodies = (self.body_1, self.body_2)
         even = sum((1.0 - m.poisson) / m.shear_modulus for m in bodies) / (2.0 * np.pi)
         odd = sum(m.poisson / m.shear_modulus for m in bodies) / (2.0 * np.pi)
@@ -112,33 +112,33 @@ class UniformStrip:
     datum: float
 
     def pressed(self, x: Array) -> tuple[Array, Array]:
-        """(u_x, u_z) under unit pressure."""
+        """Return (u_x, u_z) under unit pressure."""
         return -self._step(x), self._logarithm(x)
 
     def sheared(self, x: Array) -> tuple[Array, Array]:
-        """(u_x, u_z) under unit shear along x."""
+        """Return (u_x, u_z) under unit shear along x."""
         return self._logarithm(x), self._step(x)
 
     def _logarithm(self, x: Array) -> Array:
-        """-(2 / π E*) ∫ ln(|x - ξ| / L) dξ."""
+        """Return -(2 / π E*) ∫ ln(|x - ξ| / L) dξ."""
         compliance = 2.0 / (np.pi * ElasticPair(self.body_1, self.body_2).contact_modulus)
         ends = _x_log(x + self.half_width, self.datum) - _x_log(x - self.half_width, self.datum)
         return compliance * (2.0 * self.half_width - ends)
 
     def _step(self, x: Array) -> Array:
-        """π κ ∫ sign(x - ξ) dξ: uniform stretching under the strip, a constant either side."""
+        """Return π κ ∫ sign(x - ξ) dξ: uniform stretching below the strip, constant outside."""
         cross = _cross_compliance(self.body_1, self.body_2)
         return 2.0 * cross * np.clip(x, -self.half_width, self.half_width)
 
 
 def _cross_compliance(body_1: Material, body_2: Material) -> float:
-    """π κ = [(1 - 2ν2)/G2 - (1 - 2ν1)/G1] / 4 [1/MPa], 0 for like bodies."""
+    """Return π κ = [(1 - 2ν2)/G2 - (1 - 2ν1)/G1] / 4 [1/MPa], 0 for similar bodies."""
     below, above = ((1.0 - 2.0 * m.poisson) / m.shear_modulus for m in (body_1, body_2))
     return 0.25 * (above - below)
 
 
 def _x_log(x: Array, datum: float) -> Array:
-    """``x ln(|x| / L)``, 0 at 0."""
+    """Return ``x ln(|x| / L)``, 0 at 0."""
     distance = np.abs(x)
     return x * np.log(np.where(distance > 0.0, distance, datum) / datum)
 
@@ -146,7 +146,7 @@ def _x_log(x: Array, datum: float) -> Array:
 def _over_rectangle(
     kernel: GreensFunction, x: float, y: float, half_sides: tuple[float, float]
 ) -> Array:
-    """Integral over the rectangle of ``kernel`` from its points to ``(x, y)``, ``(3,)``."""
+    """Integrate ``kernel`` over the rectangle, from its points to ``(x, y)``, ``(3,)``."""
     a, b = half_sides
     left, right, below, above = x - a, x + a, y - b, y + b
     across = _along_edge(kernel, right, below, above) - _along_edge(kernel, left, below, above)
@@ -159,7 +159,7 @@ def _over_rectangle(
 
 
 def _along_edge(kernel: GreensFunction, distance: float, start: float, end: float) -> Array:
-    """``d ∫ kernel(d, t) dt`` from ``start`` to ``end``, which tends to 0 with d, ``(3,)``.
+    """Return ``d ∫ kernel(d, t) dt`` from ``start`` to ``end``, which tends to 0 with d, ``(3,)``.
 
     With t = |d| sinh s and homogeneity of degree -1 the integrand is smooth, however near the edge.
     """

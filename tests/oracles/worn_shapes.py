@@ -1,4 +1,4 @@
-"""A cylinder and a sphere that have slid for long: see ``tests/wear/test_closed_forms.py``."""
+"""Cylinder and sphere that have slid for long: see ``tests/wear/test_closed_forms.py``."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ import numpy as np
 def worn_cylinder(
     load: float, volume: float, radius: float, modulus: float
 ) -> tuple[float, float, float]:
-    """b [mm], W(0) [mm] and p(0) [MPa] once a cylinder has lost a ``volume`` per length [mm²]."""
+    """Return b [mm], W(0) [mm] and p(0) [MPa] of a cylinder worn by ``volume`` [mm²]."""
     a = np.sqrt(4.0 * load * radius / (np.pi * modulus))
     (b,) = (
         root.real
@@ -21,7 +21,7 @@ def worn_cylinder(
 def worn_sphere(
     load: float, volume: float, radius: float, modulus: float
 ) -> tuple[float, float, float]:
-    """b [mm], W(0) [mm] and p(0) [MPa] once a sphere has lost a ``volume`` [mm³]."""
+    """Return b [mm], W(0) [mm] and p(0) [MPa] of a sphere worn by ``volume`` [mm³]."""
     a3 = 0.75 * load * radius / modulus
     (b,) = (
         root.real

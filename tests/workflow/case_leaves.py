@@ -1,4 +1,4 @@
-"""Every entry of every kind of case, found by walking them, and where the templates lack it."""
+"""Walk over every entry of every kind of case, with the settings that the templates lack."""
 
 import functools
 import inspect
@@ -15,7 +15,7 @@ from workflow.kinds import kinds, template
 
 
 def row_in_space(points):
-    """Springs of 1 between points in a row that nothing holds, alike along all three axes."""
+    """Return springs of stiffness 1 between points in a free row, equal along all three axes."""
     stretch = np.eye(points - 1, points, k=1) - np.eye(points - 1, points)
     return np.kron(np.eye(3), stretch.T @ stretch)
 
@@ -35,7 +35,7 @@ GAPS = {
 }
 SURFACE = {"file": "disk.npy", "unit": "um", "pitch": ["20 um", "20 um"]}
 SURFACES = {"body_1": SURFACE, "body_2": SURFACE}
-# Points as far apart as takes a scan over all of a flank.
+# Points whose spacing lets a scan cover the whole flank.
 ON_FLANK = SURFACE | {"pitch": [0.1, 0.2], "beyond": "mirrored"}
 FLANK_SURFACES = {
     flank: {"disk": ON_FLANK, "blade": ON_FLANK} for flank in ("intrados", "extrados")
@@ -62,7 +62,7 @@ EVOLUTIONS = {
 
 
 def laws(lengths, *bodies):
-    """The laws and evolutions that the templates do not have, for bodies of these names."""
+    """Return the joint laws and evolutions that the templates lack, for bodies of these names."""
     by_law = {
         "archard": {"law": "archard", **lengths, **dict.fromkeys(bodies, ARCHARD_BODY)},
         "energy_amplitude": {
@@ -76,12 +76,12 @@ def laws(lengths, *bodies):
 
 
 def wear(*bodies):
-    """The same of wear cases, whose friction may change too."""
+    """Return the same for wear cases, whose friction may change as well."""
     return FRICTION | laws(LENGTHS, *bodies)
 
 
 def with_path(**loads):
-    """Loads of a mesh by kind, each pulled once and let go."""
+    """Return the loads of a mesh by kind, each applied once and released."""
     return {kind: {"kind": kind, "path": [1, 0], **load} for kind, load in loads.items()}
 
 
@@ -215,7 +215,7 @@ DAMPING = {
 
 
 def excited(point):
-    """What takes the place of the template's forces, and of the one that wears."""
+    """Return what replaces the forces of the template, including the one that wears."""
     return {
         "excitation": {ALWAYS: {"forces": [{"points": point, "amplitude": 1}]}},
         "excitation.records": {ALWAYS: [{"points": point, "file": "period.csv"}]},
@@ -349,7 +349,7 @@ APART_MATRICES = {
 APART = f"structure.matrices={APART_MATRICES | {'units': {'length': 'mm', 'force': 'N'}}}"
 # A sector of a wheel in the place of the template's mesh, with the same names.
 SECTOR = "structure.file=sector.msh"
-# What the entries of a section need beside it.
+# Further overrides that the entries of a section need.
 WITH_SECTION = {
     "structure.other_bodies.": [f"structure.contacts={BOLTED}"],
     "ring.": RING,
@@ -363,9 +363,9 @@ CELLS |= dict.fromkeys(("line", "line_wear"), (512,))
 
 @dataclass(frozen=True)
 class Leaf:
-    """An entry in one of its places: a kind of case, a dotted key there, the kinds of sections.
+    """Entry in one of its places: a kind of case, a dotted key there, the kinds of sections.
 
-    ``declared`` is the section that declares it, be it for those that inherit from it.
+    ``declared`` is the section that declares it, possibly a base of other sections.
     """
 
     kind: str
@@ -383,7 +383,7 @@ class Leaf:
 
     @property
     def needed(self) -> list[str]:
-        """Overrides that make the template have it."""
+        """Overrides that add the entry to the template."""
         overrides = []
         for section, given in (PLAIN | GIVEN.get(self.kind, {})).items():
             if self.key.startswith(f"{section}."):
@@ -410,7 +410,7 @@ class Leaf:
 
     @property
     def _shaken(self) -> list[str]:
-        """What an excitation of a steady vibration takes the place of."""
+        """Overrides that an excitation of a steady vibration replaces."""
         if self.key.startswith("excitation."):
             return SHAKEN.get(self.kind, [])
         if self.key == "wear.level":
@@ -423,7 +423,7 @@ class Leaf:
         return "tuple" in str(self.field.annotation)
 
     def listed(self, first, last):
-        """A list as long as the example, its last value another than those before."""
+        """Return a list as long as the example, whose last value differs from those before."""
         (example,) = self.field.examples
         if not isinstance(example, list):  # it may stand alone
             return last
@@ -431,12 +431,12 @@ class Leaf:
 
 
 def declaring(model: type[Section], name: str) -> type[Section]:
-    """The section that declares an entry which ``model`` has or inherits."""
+    """Return the section that declares an entry which ``model`` has or inherits."""
     return next(base for base in model.__mro__ if name in inspect.get_annotations(base))
 
 
 def leaves(model, path=(), tags=()):
-    """``(path, tags, field, declaring section)`` of every leaf, in every place.
+    """Yield ``(path, tags, field, declaring section)`` of every leaf, in every place.
 
     Lists are entered at 0, unions at all their kinds.
     """
@@ -460,7 +460,7 @@ def in_all_places() -> Iterator[Leaf]:
 
 
 def first_of_each(places: list[Leaf]) -> list[Leaf]:
-    """Every declared entry, in the first of its places."""
+    """Return every declared entry, in the first of its places."""
     first: dict[tuple[type[Section], str], Leaf] = {}
     for leaf in places:
         first.setdefault((leaf.declared, leaf.name), leaf)

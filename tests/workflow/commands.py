@@ -1,4 +1,4 @@
-"""The command line in the process of the test, and the jobs and workers that it would start."""
+"""Command line in the process of the test, with the jobs and workers that it would start."""
 
 import pickle
 import threading
@@ -28,27 +28,27 @@ AS_PROCESS = (
 
 
 def invoke(*arguments: object) -> Result:
-    """``fretscale`` with these arguments; anything but an exit is raised."""
+    """Call ``fretscale`` with these arguments; any exception except an exit is raised."""
     result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result
 
 
 def command(name: str, *arguments: object, overrides: Sequence[str] = ()) -> Result:
-    """``fretscale name`` with overrides (``"wear.cycles=1e4"``)."""
+    """Call ``fretscale name`` with overrides (``"wear.cycles=1e4"``)."""
     return invoke(name, *arguments, *(part for entry in overrides for part in ("--set", entry)))
 
 
-# --- in the place of other processes, whose start takes longer than what they do ------------------
+# --- replacements of other processes, whose start takes longer than their work --------------------
 
 
 def sent(message: Any) -> Any:
-    """What arrives at the other end of a pipe: a copy, its arrays in C order."""
+    """Return what arrives at the other end of a pipe: a copy, with arrays in C order."""
     return pickle.loads(pickle.dumps(message))
 
 
 class InThisProcess:
-    """Stands for the workers of a run: they answer one after the other, here."""
+    """Replacement of the workers of a run; they answer here, one after the other."""
 
     def __init__(self, make: Callable[..., Callable[..., Any]], settings: Sequence[Any]) -> None:
         self.done: Callable[[], None] = lambda: None
@@ -76,7 +76,7 @@ def _workers(
 
 
 class _BesideHere:
-    """Stands for the process beside a run: a job is done here, when its answer is asked for."""
+    """Replacement of the background process of a run; a job runs when its answer is needed."""
 
     def begin(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
         return lambda: function(*arguments)
@@ -93,7 +93,7 @@ def _in_order(
 
 @contextmanager
 def runs_here() -> Iterator[None]:
-    """Contacts and pictures of a run are made in this process."""
+    """Compute the contacts and pictures of a run in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact_workers, "workers", _workers)
         patch.setattr(run, "Beside", _BesideHere)
@@ -115,7 +115,7 @@ def _run_job(job: Job, out: Path, unwanted: Callable[[], bool], one_thread: bool
 
 @contextmanager
 def jobs_here() -> Iterator[None]:
-    """The runs of sweeps and of other jobs are made in this process, one after the other."""
+    """Compute the runs of sweeps and other jobs in this process, one after the other."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jobs, "run_job", _run_job)
         yield

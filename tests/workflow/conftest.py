@@ -1,4 +1,4 @@
-"""Shared by the tests of ``workflow``: synthetic results, and runs of the small case."""
+"""Fixtures of the tests of ``workflow``: synthetic results, and runs of the small case."""
 
 import json
 import shutil
@@ -38,7 +38,7 @@ INTERFACES = {"intrados": 1.0, "extrados": 0.8}  # name and its share of the loa
 INCREMENTS, PEAK, FRICTION = 22, 7, 0.4
 JUMPS = np.array([0.0, 5e3, 1e4, 2e4, 4e4, 7e4, 1e5])
 NAMES = tuple(sorted(INTERFACES))
-# Of the synthetic results.
+# Settings of the synthetic results.
 CONTENTS = Contents(
     names=NAMES,
     bodies=("disk", "blade"),
@@ -51,21 +51,21 @@ CONTENTS = Contents(
 
 
 def flank_frame(side: float) -> Frame:
-    """Frame of a flank at 45 degrees, right (+1) or left (-1) of the middle."""
+    """Return the frame of a flank at 45 degrees, right (+1) or left (-1) of the middle."""
     x = np.array([-side, 0.0, 1.0]) / np.sqrt(2.0)
     z = np.array([-side, 0.0, -1.0]) / np.sqrt(2.0)
     return Frame(np.array([15.0 * side, 0.0, 245.0]), np.array([x, np.cross(z, x), z]))
 
 
 def rounding(x: Array, y: Array) -> Array:
-    """Gap of the rounded edges and ends [mm]."""
+    """Return the gap of the rounded edges and ends [mm]."""
     beyond_x = np.maximum(np.abs(x) - (0.5 * SIZE[0] - EDGE), 0.0)
     beyond_y = np.maximum(np.abs(y) - (0.5 * SIZE[1] - END), 0.0)
     return beyond_x**2 / (2.0 * EDGE_RADIUS) + beyond_y**2 / (2.0 * END_RADIUS)
 
 
 def peak_pressure(x: Array, y: Array, cycles: float, load: float) -> Array:
-    """A flat punch's pressure: edge peaks that wear takes off [MPa]."""
+    """Return a flat punch's pressure with edge peaks that wear reduces [MPa]."""
     closed = np.clip(1.0 - rounding(x, y) / 4e-3, 0.0, None) ** 0.5
     peaks = 1.6 * np.exp(-cycles / 2e4)
     edge_x = np.exp(-np.abs(np.abs(x) - (0.5 * SIZE[0] - EDGE)) / 0.3)
@@ -74,19 +74,19 @@ def peak_pressure(x: Array, y: Array, cycles: float, load: float) -> Array:
 
 
 def depth(x: Array, y: Array, cycles: float, load: float) -> Array:
-    """Wear depth of one body [mm]."""
+    """Return the wear depth of one body [mm]."""
     return 1e-4 * cycles / 1e5 * peak_pressure(x, y, cycles, load)
 
 
 def put(group: h5py.Group, **values: Any) -> None:
-    """Store datasets the way a run does."""
+    """Store datasets in the way a run does."""
     for name, value in values.items():
         dataset = group.create_dataset(name, data=value)
         dataset.attrs["unit"], dataset.attrs["description"] = "1", name
 
 
 def put_structure(file: h5py.File, name: str, load: float, cycles: float) -> None:
-    """FE face, its fields over the cycle, and the resultants."""
+    """Write the FE face, its fields over the cycle, and the resultants."""
     group = file.create_group(f"{'structure_worn' if cycles else 'structure'}/{name}")
     nodes = np.meshgrid(
         *(0.5 * size * np.linspace(-1, 1, n) for size, n in zip(SIZE, (20, 34), strict=True)),
@@ -111,7 +111,7 @@ def put_structure(file: h5py.File, name: str, load: float, cycles: float) -> Non
 
 
 def put_contact(file: h5py.File, name: str, load: float, grid: Grid) -> None:
-    """Surfaces and tractions at every jump, the coarse grid and the half-space's energy."""
+    """Write surfaces and tractions at every jump, the coarse grid and the half-space's energy."""
     for number, cycles in enumerate(JUMPS):
         worn = depth(grid.x, grid.y, cycles, load)
         surface = file.create_group(f"surfaces/{name}/{number:05d}")
@@ -130,7 +130,7 @@ def put_contact(file: h5py.File, name: str, load: float, grid: Grid) -> None:
 
 
 def put_comparison(file: h5py.File, name: str, load: float, grid: Grid) -> None:
-    """The half-space's own cycle: its loads, and its fields at three increments."""
+    """Write the half-space's separate cycle: its loads, and its fields at three increments."""
     structure = file[f"structure/{name}/load_history"]
     history = {key: column[()] for key, column in structure.items()}
     history["Qx"] = 0.998 * history["Qx"]
@@ -143,7 +143,7 @@ def put_comparison(file: h5py.File, name: str, load: float, grid: Grid) -> None:
 
 
 def put_kinetics(file: h5py.File, name: str, grid: Grid) -> None:
-    """Depths and volumes over the cycles, from the surfaces."""
+    """Write depths and volumes over the cycles, computed from the surfaces."""
     group, jumps = file.create_group(f"kinetics/{name}"), file[f"surfaces/{name}"]
     for body in (1, 2):
         heights = np.array([jumps[jump][f"body_{body}"] for jump in sorted(jumps)])
@@ -161,14 +161,14 @@ def put_kinetics(file: h5py.File, name: str, grid: Grid) -> None:
 
 
 def put_errors(file: h5py.File, name: str) -> None:
-    """Parts of the error of two results, one of them not known."""
+    """Write parts of the error of two results, one of them unknown."""
     parts = np.array([0.004, np.nan, 0.006, 0.001, -0.003, 0.002, 0.0, 0.009])
     put(file.create_group(f"error/{name}"), depth=parts, volume=0.5 * parts)
     file[f"error/{name}"].attrs["accuracy"] = 0.05
 
 
 def put_bodies(file: h5py.File) -> None:
-    """Two boxes of tetrahedra, stretched along Z."""
+    """Write two boxes of tetrahedra, stretched along Z."""
     import pyvista as pv
 
     for body, height in {"disk": 200.0, "blade": 240.0}.items():
@@ -186,7 +186,7 @@ def put_bodies(file: h5py.File) -> None:
 
 
 def put_mission(body: h5py.Group, mesh: Any, shift: Array, stress: Array) -> None:
-    """Its surface in some increments of a cycle, at the last of which it is unloaded."""
+    """Write the surface in some increments of a cycle; it is unloaded at the last."""
     surface = mesh.extract_surface(algorithm="dataset_surface")
     vertices, share = surface["vtkOriginalPointIds"], np.array([0.5, 1.0, 0.0])
     group = body.create_group("mission")
@@ -198,7 +198,7 @@ def put_mission(body: h5py.Group, mesh: Any, shift: Array, stress: Array) -> Non
 
 
 def fabricate(path: Path, shape: tuple[int, int] = (24, 40)) -> Path:
-    """A plausible ``results.h5`` on a grid a little larger than the flank."""
+    """Write a plausible ``results.h5`` on a grid a little larger than the flank."""
     grid = Grid.covering((1.08 * SIZE[0], 1.05 * SIZE[1]), shape)
     with h5py.File(path, "w") as file:
         file.attrs.update(title="Synthetic dovetail", friction=FRICTION, peak_increment=PEAK)
@@ -220,7 +220,7 @@ def fabricate(path: Path, shape: tuple[int, int] = (24, 40)) -> Path:
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Synthetic results, not to be changed."""
+    """Return synthetic results, which tests must not change."""
     return fabricate(tmp_path_factory.mktemp("run") / "results.h5")
 
 
@@ -239,7 +239,7 @@ BOXES: dict[str, tuple[tuple[float, ...], dict[str, float]]] = {
 
 
 def write_joint(folder: Path) -> None:
-    """Ever smaller boxes on each other as ``joint.msh``, of few elements, and ``joint.step``."""
+    """Write successively smaller boxes on each other, as ``joint.msh`` and as ``joint.step``."""
     with gmsh_model("joint") as gmsh:
         occ = gmsh.model.occ
         for body, (box, heights) in BOXES.items():
@@ -258,7 +258,7 @@ def write_joint(folder: Path) -> None:
 
 
 def write_sector(folder: Path) -> None:
-    """One of 24 sectors of a disk with a block on it, ``sector.msh``, named as in ``joint.msh``."""
+    """Write a 1/24 sector of a disk with a block on it, ``sector.msh``, named as the joint."""
     names = {"pad": "top", "bore": "base", "low": "low", "high": "high"}
     disk = renamed(sector(24, dimension=3), "disk", names)
     blade = renamed(shoe(24, dimension=3), "blade", {"pad": "foot", "top": "top"})
@@ -266,7 +266,7 @@ def write_sector(folder: Path) -> None:
 
 
 def renamed(body: Body, name: str, names: dict[str, str]) -> Body:
-    """The body with some of its boundaries, by other names."""
+    """Return the body with some of its boundaries, under other names."""
     mesh = replace(body.mesh, _boundaries=None)
     return Body(
         name,
@@ -275,7 +275,7 @@ def renamed(body: Body, name: str, names: dict[str, str]) -> Body:
 
 
 def write_matrices_of_templates(folder: Path) -> None:
-    """A row of masses over pads and rings to a tip, in files of several kinds."""
+    """Write a row of masses from pads and rings to a tip, in files of several kinds."""
     inner = [f"inner {number}" for number in range(1, 36)]
     points = ["pad 1", "pad 2", "ring 1", "ring 2", *inner, "tip"]
     names = [f"{point} {axis}" for axis in "yzx" for point in points]
@@ -295,7 +295,7 @@ def write_matrices_of_templates(folder: Path) -> None:
 
 @pytest.fixture(scope="session")
 def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the files that the templates name, not to be changed."""
+    """Return a folder with the files that the templates name, which tests must not change."""
     folder = tmp_path_factory.mktemp("template")
     write_joint(folder)
     write_sector(folder)
@@ -315,7 +315,7 @@ def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> dict[str, Path]:
-    """A folder for the template of each kind, with the files that its examples name."""
+    """Return a folder for the template of each kind, with the files that its examples name."""
     made = {}
     for kind in kinds():
         made[kind] = tmp_path_factory.mktemp(kind)
@@ -340,7 +340,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
 
 @dataclass(frozen=True)
 class Run:
-    """A run that has ended: how, and what it left."""
+    """Finished run: how it ended, and its files."""
 
     ending: Result
     folder: Path
@@ -351,7 +351,7 @@ class Run:
         return summary
 
     def heights(self) -> dict[str, Array]:
-        """All surfaces of ``results.h5`` by interface, jump and body."""
+        """Return all surfaces of ``results.h5`` by interface, jump and body."""
         heights = {}
         with h5py.File(self.folder / "results.h5") as file:
             file["surfaces"].visititems(
@@ -366,12 +366,12 @@ Runner = Callable[..., Run]
 
 
 def contents_of(folder: Path) -> Contents:
-    """What a finished wear run has written, as it says itself."""
+    """Return the description of the contents of a finished wear run."""
     return read_contents(folder / "results.h5", Contents)
 
 
 def manifest_has_all(folder: Path) -> bool:
-    """Whether the manifest of a run lists what there is, and nothing else, nor a lock is left."""
+    """Return whether the manifest lists exactly the files of a run, and no lock is left."""
     listed = OutputFolder(folder).manifest
     assert listed is not None
     runs = [path.parent for path in folder.glob("*/manifest.json")]
@@ -386,13 +386,13 @@ def manifest_has_all(folder: Path) -> bool:
 
 @pytest.fixture(scope="session")
 def small_path(dovetail_path: Path) -> Path:
-    """The case of a few seconds."""
+    """Return the path of the case that takes a few seconds."""
     return dovetail_path.with_name("dovetail_small.yaml")
 
 
 @pytest.fixture(scope="session", autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A cache of the tests' own: condensed once, found again by all runs of a session."""
+    """Use a separate cache for the tests, shared by all runs of a session."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FRETSCALE_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
@@ -400,9 +400,9 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _all_here() -> Iterator[None]:
-    """Contacts and pictures of a run are made by the test: to start processes takes longer.
+    """Compute contacts and pictures in the process of the test, since starting processes is slow.
 
-    In processes of their own contacts find the same but for rounding (test_run.py).
+    Separate processes find the same contacts except for rounding (test_run.py).
     """
     with runs_here():
         yield
@@ -410,9 +410,9 @@ def _all_here() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _without_companions() -> Iterator[None]:
-    """Runs tell what they know of themselves: lives of companions take seconds.
+    """Switch off the step-doubling runs of the error estimate, which take seconds.
 
-    They are for test_error_budget.py.
+    test_error_budget.py tests them.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(wear_run, "lives_of_companions", lambda *_: lambda *_: {})
@@ -421,7 +421,7 @@ def _without_companions() -> Iterator[None]:
 
 @pytest.fixture
 def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Contacts and pictures have processes of their own, as where there is no test."""
+    """Use separate processes for contacts and pictures, as outside of tests."""
     monkeypatch.setattr(contact_workers, "workers", processes.workers)
     monkeypatch.setattr(running, "Beside", processes.Beside)
     monkeypatch.setattr(drawing, "share_out", processes.share_out)
@@ -429,7 +429,7 @@ def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def start(small_path: Path) -> Runner:
-    """Runs the small case with overrides, in this process: still smaller, without pictures."""
+    """Return a function that runs a reduced small case with overrides, without pictures."""
     fewer = ("load_path.increments=[3, 5]",)
     quiet = "output.paraview=false", "output.figures=false"
     quiet += "stress.section=none", "stress.life.parameter=none"
@@ -444,13 +444,13 @@ def start(small_path: Path) -> Runner:
 
 @pytest.fixture(scope="session")
 def resume() -> Callable[[Path], Run]:
-    """Continues a run, in this process."""
+    """Return a function that resumes a run in this process."""
     return lambda folder: Run(invoke("resume", folder), folder)
 
 
 @pytest.fixture(scope="session")
 def whole(start: Runner, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The small case from start to end, not to be changed."""
+    """Return a complete run of the small case, which tests must not change."""
     run = start(tmp_path_factory.mktemp("whole") / "out")
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
@@ -458,5 +458,5 @@ def whole(start: Runner, tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture
 def blocks(tmp_path: Path) -> Path:
-    """The case of a cube of 1 mm on one of 2 mm."""
+    """Return the case of a cube of 1 mm on one of 2 mm."""
     return pressed_blocks(tmp_path)

@@ -1,4 +1,4 @@
-"""Contact loads of faces, and tables of them, that more than one test module writes."""
+"""Contact loads of faces, and tables of them, shared by several test modules."""
 
 from dataclasses import fields
 from pathlib import Path
@@ -18,7 +18,7 @@ GOOD = {"P": 100, "Qx": -40, "Qy": 0, "Mx": 30, "My": -20, "Mz": 5, "Edx": 2, "E
 
 
 def random_loads(seed: int, count: int = 7) -> LoadHistory:
-    """Loads without a short decimal form, that no check objects to; the last row is unloaded."""
+    """Return valid loads without a short decimal form; the last row is unloaded."""
     rng = np.random.default_rng(seed)
     P = 1e3 * rng.random(count)
     P[-1] = 0.0
@@ -28,7 +28,7 @@ def random_loads(seed: int, count: int = 7) -> LoadHistory:
 
 
 def assert_same(one: LoadHistory, two: LoadHistory) -> None:
-    """Bit for bit, signs of zeros included."""
+    """Assert bitwise equality, including the signs of zeros."""
     for field in fields(LoadHistory):
         a, b = getattr(one, field.name), getattr(two, field.name)
         assert a.dtype == b.dtype
@@ -36,13 +36,13 @@ def assert_same(one: LoadHistory, two: LoadHistory) -> None:
 
 
 def flank() -> Frame:
-    """A frame at 45 degrees."""
+    """Return a frame at 45 degrees."""
     x, z = np.array([-1.0, 0.0, 1.0]) / np.sqrt(2.0), np.array([-1.0, 0.0, -1.0]) / np.sqrt(2.0)
     return Frame(np.array([15.0, 0.0, 245.0]), np.array([x, np.cross(z, x), z]))
 
 
 def face_history(seed: int = 0, line: bool = False) -> InterfaceHistory:
-    """A face of 20 x 34 nodes (or 20 along a line) that slips at random."""
+    """Return a face of 20 x 34 nodes (or 20 along a line) with random slip."""
     rng, loads = np.random.default_rng(seed), random_loads(seed)
     x, y = 5.0 * np.sin(np.linspace(-1.3, 1.3, 20)) / np.sin(1.3), np.linspace(-30.0, 30.0, 34)
     grid = np.meshgrid(x, [0.0] if line else y, indexing="ij")
@@ -58,7 +58,7 @@ def face_history(seed: int = 0, line: bool = False) -> InterfaceHistory:
 
 
 def table(rows: list[dict], header: dict[str, str] | None = None) -> str:
-    """CSV text of rows by column; ``header`` renames columns."""
+    """Return CSV text of rows by column; ``header`` renames columns."""
     names = list(rows[0])
     lines = [", ".join((header or {}).get(name, name) for name in names)]
     return "\n".join(lines + [", ".join(str(row[name]) for name in names) for row in rows]) + "\n"

@@ -1,4 +1,4 @@
-"""What must hold for every figure, whatever it shows: nothing cut, covered, empty or unbounded."""
+"""Checks of any figure: nothing is cut, covered, empty or without limits."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -19,7 +19,7 @@ CLOSE = 3.0
 
 
 def problems(figure: Figure) -> list[str]:
-    """What is wrong with a figure that has been laid out."""
+    """Return the problems of a figure that has been laid out."""
     return [
         *_empty(figure),
         *_unbounded(figure),
@@ -31,7 +31,7 @@ def problems(figure: Figure) -> list[str]:
 
 
 def _panels(figure: Figure) -> list[Axes]:
-    """Axes that are seen, colour bars apart."""
+    """Return the visible axes except colour bars."""
     return [axis for axis in figure.axes if axis.get_visible() and axis.get_label() != "<colorbar>"]
 
 
@@ -56,7 +56,7 @@ def _name(axis: Axes) -> str:
 
 
 def _texts(figure: Figure) -> list[tuple[str, Text, Bbox]]:
-    """All words that are seen, with their boxes."""
+    """Return all visible texts with their boxes."""
     numbers, drawn = set(), set()
     for axis in figure.axes:
         for line in (axis.xaxis, axis.yaxis):
@@ -97,7 +97,7 @@ def _overlaps(figure: Figure) -> Iterator[str]:
 
 
 def _covered(figure: Figure) -> Iterator[str]:
-    """Legends with points of curves below them."""
+    """Yield legends that cover points of curves."""
     legends = [axis.get_legend() for axis in _panels(figure) if axis.get_legend()]
     boxes = [legend.get_window_extent() for legend in [*legends, *figure.legends]]
     for part in figure.subfigs:
@@ -112,7 +112,7 @@ def _covered(figure: Figure) -> Iterator[str]:
 
 
 def _points(axis: Axes) -> Iterator[Any]:
-    """Places of drawn points and of the lines between them [pixels]."""
+    """Yield the positions of drawn points and of the lines between them [pixels]."""
     for line in axis.lines:
         data = np.asarray(line.get_xydata(), dtype=float)
         if line.get_transform() != axis.transData or len(data) == 0:
@@ -138,7 +138,7 @@ def _within(places: Any, box: Bbox) -> Any:
 
 
 def _white_maps(figure: Figure) -> Iterator[str]:
-    """Figures whose maps are mostly white around what they show; and maps too small to see."""
+    """Yield figures whose maps are mostly white around their data, or too small."""
     maps = [axis for axis in _panels(figure) if axis.images]
     if maps and max(map(shown_share, maps)) < LEAST_SHOWN:
         yield f"maps of {max(map(shown_share, maps)):.0%} data: {_name(maps[0])}"
@@ -149,7 +149,7 @@ def _white_maps(figure: Figure) -> Iterator[str]:
 
 
 def shown_share(axis: Axes) -> float:
-    """Share of a map's panel that the rectangle around its data takes."""
+    """Return the share of a map's panel that the bounding box of its data takes."""
     values = np.ma.asarray(axis.images[-1].get_array())
     there = ~np.ma.getmaskarray(values)
     left, right, bottom, top = axis.images[-1].get_extent()

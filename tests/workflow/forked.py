@@ -1,7 +1,7 @@
-"""The command in processes of its own that need not import anything: for those that are killed.
+"""Command in forked processes that need not import anything, for tests that kill them.
 
-A server has imported what runs need, and nothing else has happened in it: no thread, plan or file
-is there twice when it forks.
+The fork server has only imported what runs need, so that no thread, plan or open file exists twice
+after a fork.
 """
 
 import multiprocessing
@@ -29,9 +29,9 @@ def _server() -> multiprocessing.context.ForkServerContext:
 
 
 def start(words: list[str], share: float, first: float) -> BaseProcess:
-    """Run the command; ``steps.SHARE`` and ``steps.FIRST_SAVE`` are as given, where steps are kept.
+    """Run the command with these values of ``steps.SHARE`` and ``steps.FIRST_SAVE``.
 
-    Nothing of it is shown.
+    Its output is not shown.
     """
     process = _server().Process(target=_run, args=(words, share, first), daemon=False)
     process.start()

@@ -1,4 +1,4 @@
-"""What tests of interrupted runs look for."""
+"""Checks shared by the tests of interrupted runs."""
 
 import os
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 @contextmanager
 def ctrl_c_after_jumps(jumps: int) -> Iterator[None]:
-    """A run in this process gets Ctrl-C once so many jumps are kept."""
+    """Send Ctrl-C to a run in this process once this number of jumps is stored."""
     keep = Recorder.keep
 
     def interrupting(recorder, state):
@@ -33,7 +33,7 @@ def ctrl_c_after_jumps(jumps: int) -> Iterator[None]:
 
 
 def assert_equal(run, reference):
-    """Same surfaces and kinetics, bit for bit."""
+    """Assert that surfaces and kinetics are bitwise equal."""
     assert run.ending.exit_code == 0, run.ending.stderr
     heights, expected = run.heights(), reference.heights()
     assert heights.keys() == expected.keys()
@@ -46,6 +46,6 @@ def assert_equal(run, reference):
 
 
 def jumps_kept(folder: Path) -> int:
-    """Whole jumps in the checkpoint."""
+    """Return the number of complete jumps in the checkpoint."""
     path = folder / "checkpoint.h5"
     return len(read_arrays(path)[0]["jumps"]) - 1 if path.exists() else -1

@@ -1,4 +1,4 @@
-"""Cases of meshes that more than one test module writes and runs."""
+"""Cases of meshes that several test modules write and run."""
 
 import json
 
@@ -20,7 +20,7 @@ ABAQUS_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 
 
 def write_case(path, structure, legs, mu=0.5, grid=(16, 16), **changes):
-    """A case file of the given structure, steel on steel."""
+    """Write a case file of the given structure, steel on steel."""
     case = {
         "title": "Bodies of a mesh file",
         "analysis": "wear",
@@ -44,7 +44,7 @@ def settings(overrides):
 
 
 def refused(path, *overrides):
-    """The one line that refuses a case, after its ``fretscale: ``."""
+    """Return the one line that refuses a case, without its prefix ``fretscale: ``."""
     ending = invoke("check", path, *settings(overrides))
     assert ending.exit_code == 2, ending.output
     (line,) = ending.stderr.splitlines()
@@ -52,14 +52,14 @@ def refused(path, *overrides):
 
 
 def run(case, out, *overrides):
-    """The summary of a run."""
+    """Run a case and return its summary."""
     ending = invoke("run", case, "--out", out, *settings(overrides))
     assert ending.exit_code == 0, ending.stderr
     return json.loads((out / "summary.json").read_text("utf-8"))
 
 
 def cube(name, size):
-    """A part: a cube of 2 x 2 x 2 elements, with surfaces below, above and at y = 0."""
+    """Return a cube of 2 x 2 x 2 elements, with surfaces below, above and at y = 0."""
     axis = np.linspace(0.0, size, 3).tolist()
     places = [(x, y, z) for z in axis for y in axis for x in axis]
     lines = [f"*Part, name={name}", "*Node"]
@@ -91,7 +91,7 @@ ASSEMBLY = """\
 *Static
 *End Step
 """
-# Two blocks, pressed together and then pushed to and fro without sliding off.
+# Two blocks, pressed together and then pushed back and forth without sliding off.
 BLOCKS = {
     "body_1": "Base-1",
     "body_2": "Foot-1",
@@ -106,7 +106,7 @@ TO_AND_FRO = {"increments": [1, 2, 2, 2], "cycle_from": 3, "peak_leg": 4}
 
 
 def edit(path, old, new):
-    """Replace text in a file and give its lines."""
+    """Replace text in a file and return its lines."""
     text = path.read_text("utf-8")
     assert old in text
     path.write_text(text.replace(old, new), encoding="utf-8")
@@ -114,7 +114,7 @@ def edit(path, old, new):
 
 
 def pressed_blocks(folder):
-    """A case of a cube of 1 mm on one of 2 mm, as CAE would write them."""
+    """Write a case of a cube of 1 mm on one of 2 mm, as CAE would write it."""
     text = cube("base", 2.0) + cube("foot", 1.0) + ASSEMBLY
     (folder / "blocks.inp").write_text(text, encoding="utf-8")
     return write_case(folder / "blocks.yaml", {"file": "blocks.inp", **BLOCKS}, TO_AND_FRO)

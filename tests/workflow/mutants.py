@@ -1,6 +1,6 @@
 """Mutants of the shipped cases and of the templates: texts, and overrides of the command line.
 
-A mutant is known by its number alone: the same number makes the same mutant again.
+A mutant is determined by its number: the same number makes the same mutant again.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ OFF = re.compile(rb"^( *)# ?( *(?:- )?\w+:)")
 
 @dataclass(frozen=True)
 class Mutant:
-    """A case that something has been done to; ``told`` is what, for whoever has to find out."""
+    """Case with a random change, which ``told`` describes to help find the cause of a failure."""
 
     number: int
     text: bytes
@@ -83,13 +83,13 @@ class Mutant:
 
 
 def sources() -> dict[str, str]:
-    """The texts that mutants are made of: all shipped cases, all templates."""
+    """Return the texts that mutants are made from: all shipped cases and all templates."""
     shipped = {path.name: path.read_text(encoding="utf-8") for path in sorted(CASES.glob("*.yaml"))}
     return shipped | {f"template {kind}": template(kind) for kind in kinds()}
 
 
 class Mutants:
-    """Makes mutants of texts by their numbers."""
+    """Generator of mutants of texts by their numbers."""
 
     def __init__(self, texts: Mapping[str, str]) -> None:
         self._texts = texts
@@ -125,7 +125,7 @@ class Mutants:
         return self._texts[name].encode(), overrides, shown
 
     def _change(self, chance: random.Random, tree: Any) -> str:
-        """Do something to a tree of plain data; what, in a few words."""
+        """Change a tree of plain data; return a short description."""
         path = chance.choice(list(places(tree)))
         holder, key = _at(tree, path[:-1]), path[-1]
         how = chance.choices(
@@ -166,7 +166,7 @@ def _at(tree: Any, path: Path) -> Any:
 
 
 def places(tree: Any, path: Path = ()) -> Iterator[Path]:
-    """The paths of all entries."""
+    """Yield the paths of all entries."""
     items: Any = tree.items() if isinstance(tree, dict) else ()
     items = enumerate(tree) if isinstance(tree, list) else items
     for key, value in items:
@@ -182,7 +182,7 @@ def _misspelt(chance: random.Random, key: str) -> str:
 
 
 def _scaled(chance: random.Random, value: Any) -> Any:
-    """A number or quantity made larger or smaller, of another sign or in another unit."""
+    """Return a number or quantity that is larger or smaller, or has another sign or unit."""
     factor = chance.choice((0, -1, 1e-12, 1e-6, 1e-3, 0.1, 0.5, 2, 10, 1e3, 1e6, 1e12))
     if isinstance(value, bool) or value is None or isinstance(value, dict):
         return value
@@ -202,7 +202,7 @@ def _scaled(chance: random.Random, value: Any) -> Any:
 
 
 def _edited(chance: random.Random, raw: bytes) -> tuple[bytes, str]:
-    """The text with something done to it that knows nothing of YAML."""
+    """Return the text with a change that ignores YAML syntax."""
     place = chance.randrange(len(raw) + 1)
     lines = raw.split(b"\n")
     line = chance.randrange(len(lines))
@@ -244,7 +244,7 @@ def _override(chance: random.Random, tree: Any) -> str:
 
 
 def written(tree: Any, indent: str = "") -> str:
-    """The tree as YAML, each entry on a line of its own."""
+    """Return the tree as YAML, with each entry on its own line."""
     if isinstance(tree, dict) and tree:
         return "".join(_entry(f"{_scalar(key)}:", value, indent) for key, value in tree.items())
     if isinstance(tree, list) and any(isinstance(item, dict) for item in tree):

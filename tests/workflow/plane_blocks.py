@@ -1,4 +1,4 @@
-"""A cylinder's foot on a block, both meshed in the plane and fine where they meet: a mesh case."""
+"""Mesh case of a cylinder's foot on a block, both meshed in the plane and finely at the contact."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,10 +23,10 @@ RUBBER, CERAMIC = {"young": "0.2 GPa"}, {"young": "2000 GPa"}
 
 @dataclass(frozen=True)
 class Blocks:
-    """A foot over x in ``foot`` on a block over ``base`` and ``depth`` thick [mm].
+    """Foot over x in ``foot`` on a block over ``base`` and ``depth`` thick [mm].
 
-    Elements are as large as told within ``fine``; ``hold`` is how the block stands on its base.
-    ``half`` of both, over x > 0, are cut by a plane of symmetry.
+    Elements have the requested size within ``fine``; ``hold`` is how the block is supported at its
+    base. ``half`` of both, over x > 0, is cut by a plane of symmetry.
     """
 
     base: tuple[float, float]
@@ -47,7 +47,7 @@ class Blocks:
         legs: dict[str, Any],
         friction: float = 0.0,
     ) -> Path:
-        """The case on elements of ``size`` [mm]. Shear is imposed by ``loads`` or is 0."""
+        """Write the case with elements of ``size`` [mm]. Shear is imposed by ``loads`` or is 0."""
         layer = (0.0, 0.25 * (self.fine[1] - self.fine[0]))
         blocks = []
         for name, (low, high), thick, sign in (
@@ -78,14 +78,14 @@ class Blocks:
         return write_case(path, structure, legs, mu=friction, grid=grid, materials=materials)
 
     def press(self, folder: Path, size: float, load: float) -> Path:
-        """The case of the foot pressed on by ``load`` [N/mm], without friction."""
+        """Write the case of the foot pressed on by ``load`` [N/mm], without friction."""
         pressure = load / (self.foot[1] - self.foot[0])
         pressed = {"kind": "pressure", "group": "foot_z1", "pressure": pressure, "path": [1, 0.5]}
         return self.write(folder, size, [pressed], {"increments": [1, 1]})
 
 
 def solved(path: Path, *settings: str) -> tuple[InterfaceHistory, FaceContact, FirstContact]:
-    """The unworn cycle of the structure, the contact, and its first cycle."""
+    """Return the unworn cycle of the structure, the contact, and its first cycle."""
     case = load_case(path, list(settings))
     source = structure_of(case).source(case)
     (history,), stage = source.unworn(), face_contact(case, source.faces[0])
@@ -93,13 +93,13 @@ def solved(path: Path, *settings: str) -> tuple[InterfaceHistory, FaceContact, F
 
 
 def error(pressure: Array, exact: Array) -> float:
-    """Largest error of a pressure, over its largest, where it is more than half of that."""
+    """Return the largest relative error of a pressure where it exceeds half of its maximum."""
     inner = exact > 0.5 * exact.max()
     return float(np.abs(pressure - exact)[inner].max() / exact.max())
 
 
 def _graded(ends: tuple[float, float], fine: tuple[float, float], size: float) -> Array:
-    """Places of ``size`` in the ``fine`` part and farther apart towards the ``ends``."""
+    """Return coordinates with spacing ``size`` in the ``fine`` part, wider towards the ``ends``."""
     low, high = fine
     middle = np.linspace(low, high, round((high - low) / size) + 1)
     below, above = (_growing(size, abs(end - near)) for end, near in zip(ends, fine, strict=True))
@@ -107,7 +107,7 @@ def _graded(ends: tuple[float, float], fine: tuple[float, float], size: float) -
 
 
 def _growing(size: float, length: float) -> Array:
-    """Distances up to a ``length``, each step by as much longer; none where there is no length."""
+    """Return distances up to a ``length`` with growing steps; none for a length of 0."""
     if length <= 0.0:
         return np.empty(0)
     steps = [GROWTH * size]
@@ -118,7 +118,7 @@ def _growing(size: float, length: float) -> Array:
 
 
 def _block(name: str, x: Array, z: Array) -> Body:
-    """A rectangle of triangles with boundaries x0 ... z1."""
+    """Return a rectangle of triangles with boundaries x0 ... z1."""
     ends = {
         f"{axis}{end}": (lambda p, k=k, value=value: np.isclose(p[k], value))
         for k, (axis, places) in enumerate((("x", x), ("z", z)))

@@ -1,8 +1,8 @@
-"""Small scans as instruments' programs write them, packed from the descriptions of the formats.
+"""Small scans in instrument file formats, packed from the descriptions of the formats.
 
 Nothing of the readers is used, and heights are known: :data:`LINES` in um, the lines along x one
 after the other, 0.5 um apart along x and 0.75 um along y. SurfaceTopography 1.27.1 reads the same
-heights and pitch from each binary file but `zipped.sur`, which it does not take.
+heights and pitch from each binary file except `zipped.sur`, which it does not accept.
 Sources: ISO 25178-71 (.sdf), ISO 25178-72 (.x3p), Digital Surf's file format of 2009 (.sur), the
 specification of AL3D 1.0 (.al3d), digitalmetrology.com/omnisurf3d-file-format (.os3d), Gwyddion's
 user guide (.gwy, text) and its modules sensofar, sensofarx, rmitmd, opdfile and keyence.
@@ -27,7 +27,7 @@ GONE = np.isnan(LINES)
 
 
 def filled(missing, code, scale=1.0):
-    """Heights as numbers of a file, the point that is missing as the file says it."""
+    """Return heights as numbers of a file, with the missing point in the file's notation."""
     return np.where(GONE, missing, np.nan_to_num(LINES) * scale).astype(code).tobytes()
 
 
@@ -40,7 +40,7 @@ def zipped(files, before=b""):
 
 
 def x3p(kind="D"):
-    """Metres as doubles, or counts of 1e-7 m with a file of the points that are valid."""
+    """Return metres as doubles, or counts of 1e-7 m with a file of the valid points."""
     data = {"D": filled(np.nan, "<f8", 1e-6), "I": (STEPS + 0 * GONE).astype("<i2").tobytes()}[kind]
     step, link = ("1", "") if kind == "D" else ("1.25e-7", "<ValidPointsLink>v</ValidPointsLink>")
     axis = "<{0}><AxisType>{1}</AxisType><DataType>{2}</DataType><Increment>{3}</Increment></{0}>"
@@ -63,7 +63,7 @@ def x3p(kind="D"):
 
 
 def sur(unit="µm", per_micron=1.0, inverted=0, pressed=False):
-    """Counts of an eighth of a micron in any unit, or the same compressed."""
+    """Return counts of an eighth of a micron in any unit, or the same compressed."""
     counts = np.where(GONE, -3, STEPS).astype("<i4").tobytes()
     stream = struct.pack("<3I", 1, len(counts), len(zlib.compress(counts))) + zlib.compress(counts)
     units = [text.encode("latin-1").ljust(16) for text in ("X", "Y", "Z", "mm", "mm", unit)]
@@ -137,14 +137,14 @@ def os3d():
 
 
 def tmd(comment=b"Created by TrueMap v6\r\n\0"):
-    """All lengths in mm, heights too."""
+    """Return a file with all lengths in mm, including heights."""
     head = b"Binary TrueMap Data File v2.0\r\n\0" + comment
     head += struct.pack("<2I4f", NX, NY, 1e-3 * NX * DX, 1e-3 * NY * DY, 0.0, 0.0)
     return head + (1e-3 * WHOLE).astype("<f4").tobytes()
 
 
 def opd(name=b"Raw", pixels=4):
-    """Heights in wavelengths of 500 nm over `Mult`, columns from the last line up."""
+    """Return heights in wavelengths of 500 nm over `Mult`, columns from the last line up."""
     scale, missing = {4: (2.0, 1e38), 2: (2000.0, 32767)}[pixels]
     mult = {4: 1, 2: 1000}[pixels]
     raw = np.where(GONE, missing, np.nan_to_num(LINES) * scale)[::-1].T
@@ -160,7 +160,7 @@ def opd(name=b"Raw", pixels=4):
 
 
 def gwy():
-    """Heights in metres in the second channel, with a mask; volts in the first."""
+    """Return heights in metres in the second channel, with a mask; volts in the first."""
 
     def item(name, kind, value):
         return name.encode() + b"\0" + kind.encode() + value
@@ -190,7 +190,7 @@ def gwy():
 
 
 def vk4():
-    """Counts of 125 nm; the file cannot say that one is missing."""
+    """Return counts of 125 nm; the file cannot mark a missing point."""
     places = dict.fromkeys(range(17), 0) | {0: 84, 6: 400, 16: 2000}
     head = b"VK4_" + bytes(8) + struct.pack("<18I", *places.values(), 0)
     conditions = np.zeros(70, dtype="<u4")
@@ -229,14 +229,14 @@ _POINTS = [(DX * i, DY * j, z) for j, row in enumerate(_HEIGHTS) for i, z in enu
 
 
 def points(heading, separator=",", comma=False, end="\n"):
-    """A table of x, y and z in um."""
+    """Return a table of x, y and z in um."""
     rows = [separator.join(map(str, point)) for point in _POINTS]
     text = end.join([heading, *rows] if heading else rows) + end
     return text.replace(".", ",") if comma else text
 
 
 def gwyddion(words, per_micron=1e-6):
-    """Lines along x below Gwyddion's header in some language."""
+    """Return lines along x below Gwyddion's header in some language."""
     channel, width, height, unit = words
     lines = ["\t".join("nan" if z == "nan" else f"{float(z) * per_micron:.9g}" for z in row)
              for row in _HEIGHTS]  # fmt: skip

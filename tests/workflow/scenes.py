@@ -1,4 +1,4 @@
-"""Cases of a few lines that more than one test module runs, as texts."""
+"""Short case texts that several test modules run."""
 
 BALL = """\
 title: Ball
@@ -15,7 +15,7 @@ load_path:
 contact: {grid: [16, 16], size: [1 mm, 1 mm]}
 """
 
-# The loads of a cylinder that slides to and fro are in a table beside it.
+# The loads of a cylinder that slides back and forth are in a table in the same folder.
 ROLLER_WEAR = """\
 title: Cylinder that wears under loads of a table
 analysis: wear

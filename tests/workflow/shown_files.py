@@ -1,4 +1,4 @@
-"""What every file for ParaView has to keep to, and what a script of a run shows."""
+"""Checks of every file for ParaView, and of the script that shows a run."""
 
 import ast
 import re
@@ -13,7 +13,7 @@ UNITS = {"1", "mm", "mm^2", "MPa", "N", "s", "N/mm", "N^2/mm^3", "MPa^2", "N mm"
 
 
 def check_arrays(folder: Path) -> None:
-    """Every array of every file has a unit in its name, and nothing but numbers."""
+    """Assert that every array of every file has a unit in its name and contains only numbers."""
     files = sorted(path for path in folder.rglob("*") if path.suffix in SUFFIXES)
     assert files
     for path in files:
@@ -30,13 +30,13 @@ def check_arrays(folder: Path) -> None:
 
 
 def total(mesh: Any, name: str) -> float:
-    """The integral of a field of a face: its sum over the points with what each stands for."""
+    """Return the integral of a field over a face: the sum over the points times their shares."""
     shares = mesh["length [mm]" if "length [mm]" in mesh.point_data else "area [mm^2]"]
     return float(mesh[name].astype(float) @ shares.astype(float))
 
 
 def scene_of(script: Path) -> dict[str, Any]:
-    """What a script shows."""
+    """Return the scene of a script."""
     for node in ast.parse(script.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "SCENE":
             scene: dict[str, Any] = ast.literal_eval(node.value)
@@ -45,7 +45,7 @@ def scene_of(script: Path) -> dict[str, Any]:
 
 
 def check_scene(script: Path) -> dict[str, Any]:
-    """Every file and array that a script shows is there, at the time that it begins with."""
+    """Assert that every file and array of a script exists, at its first time; return the scene."""
     scene = scene_of(script)
     assert 1 <= len(scene["views"]) <= 4
     for view in scene["views"]:

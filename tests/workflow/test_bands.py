@@ -1,4 +1,4 @@
-"""95 % bands of a sweep: what a fit knows goes in, quantiles with their own error come out."""
+"""Tests of the 95 % bands of a sweep: samples of a fit, and quantiles with their own error."""
 
 import json
 
@@ -30,12 +30,12 @@ def parameter(name, value, bounds, *, allowed=FREE, logarithmic=False, entries=N
 
 
 def even(power, columns):
-    """Normal numbers ``(2**power, columns)``, spread evenly, without correlation."""
+    """Return normal numbers ``(2**power, columns)``, evenly spread and uncorrelated."""
     return ndtri(Sobol(columns, rng=0).random_base2(power))
 
 
 def test_a_sample_has_the_bounds_of_the_fit():
-    """Medians and 95 % bounds of each are those told, of a profile and of a logarithm too."""
+    """Medians and 95 % bounds equal those of the fit, also for a profile and a logarithm."""
     told = [
         parameter("a", 3.0, (2.0, 3.5)),
         parameter("b", 1e9, (1e8, 1e10), logarithmic=True),
@@ -49,7 +49,7 @@ def test_a_sample_has_the_bounds_of_the_fit():
 
 
 def test_correlation_is_that_of_the_fit_and_bands_are_of_first_order():
-    """Of a line, what is linear in a and b has sd² = g C gᵀ; that of the fit's own band."""
+    """A result that is linear in a and b has sd² = g C gᵀ, as the fit's own band does."""
     energy = np.linspace(1.0, 6.0, 40)
     rng = np.random.default_rng(3)
     volume = 5.0 * energy + 2.0 + 0.1 * rng.standard_normal(40)
@@ -66,7 +66,7 @@ def test_correlation_is_that_of_the_fit_and_bands_are_of_first_order():
 
 
 def test_bands_of_fits_hold_the_truth():
-    """A line from data with scatter, sampled as a sweep does: the truth is in 95 % of its bands."""
+    """95 % of the bands contain the truth, for lines through scattered data sampled by a sweep."""
     energy, at, truth = np.linspace(1.0, 6.0, 6), 9.0, 5.0
     normal, rng, hits = even(9, 1), np.random.default_rng(8), 0
     for _ in range(300):
@@ -81,7 +81,7 @@ def test_bands_of_fits_hold_the_truth():
 
 
 def test_the_error_of_a_side_is_that_of_order_statistics():
-    """Its quantile is between the two in 95 of 100 samples or more; a few runs do not tell."""
+    """Its quantile lies between both in at least 95 of 100 samples; few runs give no error."""
     rng, inside = np.random.default_rng(1), 0
     for _ in range(400):
         low, high = band_of(rng.standard_normal(400))["upper_within"]
@@ -95,7 +95,7 @@ def test_the_error_of_a_side_is_that_of_order_statistics():
 
 
 def test_a_loop_has_a_band_on_each_of_its_ways():
-    """Jenkins' loops of many µ: sliding there and back at ± µ P, whose band is that of µ."""
+    """Jenkins loops of many µ slide at ± µ P, so both ways have the band of µ."""
     friction = 0.4 + 1e-3 * np.arange(1, 200)  # quantiles are exact
     there = np.linspace(1.0, -1.0, 81)
     loops = []
@@ -116,7 +116,7 @@ def test_a_loop_has_a_band_on_each_of_its_ways():
 
 
 def test_curves_of_the_runs_are_drawn_with_bands(tmp_path):
-    """Panels of one axis share a figure; what no run changes has none, and a failure no curve."""
+    """Panels of one axis share a figure; constant curves have no band, failed runs no curve."""
     rows = []
     for number in range(FEWEST):
         root = tmp_path / f"{number}"
@@ -195,7 +195,7 @@ def test_fits_that_do_not_go_with_a_sweep(load, text, changes, words):
 
 
 def test_shared_rates_go_to_all_entries_that_have_them(tmp_path):
-    """Li's table: one rate of two functions is one column of a sample, two entries of a case."""
+    """One rate of two functions (Li's table) is one column of a sample but two entries."""
     from workflow.fit.report import summary
     from workflow.fit.running import run_fit
     from workflow.fit.schema import load_fit

@@ -1,4 +1,4 @@
-"""Bodies that wear under legs or a file: the case, its loads, and what a run of it finds."""
+"""Tests of bodies that wear under legs or a load file: the case, its loads, and its results."""
 
 import json
 from pathlib import Path
@@ -40,7 +40,7 @@ def run(case: BodiesWearCase | LineBodiesWearCase, folder: Path) -> dict[str, An
 
 
 def test_legs_begin_where_the_last_one_ends() -> None:
-    """A constant force needs to be named once; Qx swings between its two ends."""
+    """A constant force needs to be given once; Qx swings between its two ends."""
     case = area(FORCED)
     assert parse_case(dump_case(case), "dump") == case
     source = BodiesSource(case)
@@ -68,7 +68,7 @@ def test_a_file_says_the_same_as_legs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("method", ["normal", "full"])
 def test_a_stroke_is_legs_of_motion(tmp_path: Path, method: str) -> None:
-    """To and fro about where the bodies met: the same worn depths."""
+    """A stroke and legs back and forth about the first contact give the same worn depths."""
     legs = (
         "{legs: [{P: 50, shift_x: 25 um, shift_y: 0, increments: 2}, "
         "{shift_x: -25 um, increments: 2}]}"
@@ -79,7 +79,7 @@ def test_a_stroke_is_legs_of_motion(tmp_path: Path, method: str) -> None:
         run(area(path, *settings), tmp_path / name)
         with h5py.File(tmp_path / name / "results.h5") as file:
             depths[name] = file["surfaces/interface/00002/body_2"][()]
-    # Legs begin with the way back: a cycle has no beginning, but steps wear one after the other.
+    # Legs begin with the way back: a cycle has no beginning, but wear steps have an order.
     scale = np.ptp(depths["stroke"] - depths["stroke"].min())
     assert scale > 0.0
     np.testing.assert_allclose(depths["legs"], depths["stroke"], atol=1e-2 * scale)
@@ -106,7 +106,7 @@ def test_what_makes_no_sense_is_refused(load_path: str, overrides: tuple[str], w
 
 
 def test_friction_that_does_not_carry_the_force_ends_the_run(tmp_path: Path) -> None:
-    """Where forces are imposed nothing says how far bodies would slide: a line that says so."""
+    """Imposed forces do not determine a sliding distance, so the run ends with a message."""
     case = area(FORCED.replace("10 N", "30 N"), *PLAIN)
     path = tmp_path / "case.yaml"
     path.write_text(dump_case(case), encoding="utf-8")
@@ -116,7 +116,7 @@ def test_friction_that_does_not_carry_the_force_ends_the_run(tmp_path: Path) -> 
 
 
 def test_a_rigid_punch_held_at_its_approach_wears_itself_free(tmp_path: Path) -> None:
-    """An elastic cylinder on a rigid flat: the force falls, and what it was is Hertz's."""
+    """An elastic cylinder on a rigid flat starts with Hertz's force, which then falls."""
     text = [
         "materials.body_1=rigid",
         "contact={grid: [128, 1], size: 2 mm, method: normal}",
@@ -133,7 +133,7 @@ def test_a_rigid_punch_held_at_its_approach_wears_itself_free(tmp_path: Path) ->
 
 
 def test_the_force_of_a_held_approach_is_told_worn_too(tmp_path: Path) -> None:
-    """At peak load nothing slides: what presses there is found on the surfaces at the end."""
+    """The force is reported for the final surfaces, although nothing slides at peak load."""
     approach = "{legs: [{approach: 1 um, shift_x: 4 um}, {shift_x: 0}, {approach: 1.2 um}]}"
     settings = ["contact.method=normal", "wear.cycles=2e4", "wear.step.cycles=1e4", *PLAIN]
     found = run(area(approach, *settings), tmp_path / "out")["interface"]["peak_load"]
@@ -145,7 +145,7 @@ def test_the_force_of_a_held_approach_is_told_worn_too(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_what_forces_dissipate_only_the_half_space_knows(tmp_path: Path) -> None:
-    """Slip and energies that imposed forces do not tell are left out, in all that is written."""
+    """Slip and energies that imposed forces do not determine are left out of all output."""
     settings = ["wear.cycles=200", "wear.step.cycles=200", NO_STRESS, "output.paraview=false"]
     found = run(area(FORCED, *settings), tmp_path / "out")["interface"]
     assert found["energy_per_cycle"].keys() == {"half_space"}
@@ -168,7 +168,7 @@ TURNING = "{legs: [{P: 60 N, Qx: 12 N}, {P: 40 N, Qx: -12 N}]}"
 
 
 def cycle_energy(case: BodiesWearCase, parts: int = 1) -> float:
-    """What an unworn cycle dissipates, its increments in so many parts [N mm]."""
+    """Return the energy that an unworn cycle dissipates, with increments in ``parts`` [N mm]."""
     source = BodiesSource(case, parts)
     _, first = face_contact(case, source.faces[0]).begin(source.unworn()[0], 1.0)
     return float(first.energy.sum())
@@ -180,7 +180,7 @@ def cycle_energy(case: BodiesWearCase, parts: int = 1) -> float:
 def test_increments_are_split_until_they_leave_the_accuracy(
     legs: str, whole: float, accuracy: float
 ) -> None:
-    """As the template writes them, one to a leg, they leave far more."""
+    """The template's increments, one per leg, have a far larger error."""
     case = area(legs, *COARSE, f"contact.accuracy={accuracy}")
     many = cycle_energy(case, 16)
     chosen, record = ANALYSIS.choose(case)
@@ -194,7 +194,7 @@ def test_increments_are_split_until_they_leave_the_accuracy(
 
 
 def test_what_should_stick_hardly_slips() -> None:
-    """Q rises with P by less than µ: no slip at all (Mindlin and Deresiewicz 1953)."""
+    """Q rises with P by less than µ, so nothing slips (Mindlin and Deresiewicz 1953)."""
     case = area("{legs: [{P: 80 N, Qx: 4 N}, {P: 40 N, Qx: 0 N}]}", *COARSE)
     chosen, _ = ANALYSIS.choose(case)
     assert isinstance(chosen, BodiesWearCase)
@@ -202,7 +202,7 @@ def test_what_should_stick_hardly_slips() -> None:
 
 
 def test_accuracy_and_strokes_that_slide_take_the_increments_as_they_are() -> None:
-    """Shear that slides at a constant pressure has no error by its increments."""
+    """Sliding shear at a constant pressure has no error due to its increments."""
     for case in (
         area("{P: 50, stroke: 50 um, increments: 2}"),
         area(TURNING, "contact.accuracy=1"),
@@ -212,7 +212,7 @@ def test_accuracy_and_strokes_that_slide_take_the_increments_as_they_are() -> No
 
 @pytest.mark.slow
 def test_a_run_tells_what_the_rows_of_a_file_leave(tmp_path: Path) -> None:
-    """Rows are not split: volume is too large by what is told, which is no 0."""
+    """Rows of a file are not split, and the actual, nonzero error of the volume is reported."""
     (tmp_path / "cycle.csv").write_text("P,Qx\n60,12\n40,-12\n")
     settings = [
         *SMALL,

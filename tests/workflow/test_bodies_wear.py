@@ -1,4 +1,4 @@
-"""Two bodies that wear without a structure: the case, its loads, and what a run of it finds."""
+"""Tests of two bodies that wear without a structure: the case, its loads, and its results."""
 
 import json
 import pickle
@@ -45,7 +45,7 @@ def line(*overrides: str) -> LineBodiesWearCase:
 def worn(
     case: BodiesWearCase | LineBodiesWearCase, jumps: int = 4
 ) -> tuple[FaceContact, InterfaceState]:
-    """The contact after the cycles of the case, in this process."""
+    """Return the contact after the cycles of the case, computed in this process."""
     source = BodiesSource(case)
     stage = face_contact(case, source.faces[0])
     state, _ = stage.begin(source.unworn()[0], case.wear.cycles)
@@ -110,7 +110,7 @@ def test_cases_of_the_repository_expect_something(name: str) -> None:
 
 
 def test_a_cycle_goes_there_and_back() -> None:
-    """Constant speed, closed, along the direction asked for; friction against it."""
+    """The motion has constant speed along the direction and is closed; friction opposes it."""
     case = area("load_path.increments=3", "load_path.direction=30 deg", "friction.coefficient=0.5")
     source = BodiesSource(case)
     motion = source.motion
@@ -151,7 +151,7 @@ def test_a_flat_stands_on_its_step() -> None:
 
 
 def test_volume_is_what_sliding_that_far_wears() -> None:
-    """V = α µ P 2 s N for either body, whatever the shape."""
+    """Either body loses V = α µ P 2 s N, whatever the shape."""
     case = area("wear.cycles=1000", "wear.body_2.coefficient=3e3 um^3/J")
     stage, state = worn(case)
     sliding = case.friction.coefficient * 50.0 * 2.0 * 0.05 * 1000.0
@@ -174,7 +174,7 @@ def test_heights_of_a_cylinder_wear_as_the_cylinder(tmp_path: Path) -> None:
 
 
 def test_direction_turns_what_wears() -> None:
-    """Along y as along x, turned; over a stroke that is not small."""
+    """Wear along y equals wear along x, turned, for a stroke that is not small."""
     overrides = "wear.cycles=200", "load_path.stroke=0.2 mm", "load_path.P=20 N"
     along_x = worn(area(*overrides))[1].surfaces
     along_y = worn(area(*overrides, "load_path.direction=90 deg"))[1].surfaces
@@ -189,7 +189,7 @@ def test_direction_turns_what_wears() -> None:
 
 
 def test_following_the_motion_can_be_forced() -> None:
-    """Automatic is what a stroke of all of the first contact or a fiftieth of it asks for."""
+    """Automatic mode follows the motion if the stroke exceeds a fiftieth of the first contact."""
     overrides = "wear.cycles=200", "load_path.P=20 N"
     for stroke, automatic in (("0.2 mm", "follow"), ("4 um", "neglect")):
         given = [*overrides, f"load_path.stroke={stroke}"]
@@ -202,11 +202,11 @@ def test_following_the_motion_can_be_forced() -> None:
 
 
 def test_the_flat_wears_as_the_punch_passes_over_it() -> None:
-    """A strip that wears nothing by itself: the trapezoid of its pressure, once that is uniform.
+    """A strip that does not wear itself wears the flat by the trapezoid of its uniform pressure.
 
-    Conforming, p = P/2a; the flat is then worn by p times the share of the stroke that the strip is
-    over it: down to the whole in the middle, half of it below the strip's edges in their middle
-    place, nothing a + s/2 away.
+    The bodies conform, p = P/2a. The flat is then worn by p times the share of the stroke that the
+    strip is over it: fully in the middle, by half below the strip's edges in its middle position,
+    and not at all a + s/2 away.
     """
     case = line(
         f"structure={STRIP}",
@@ -231,10 +231,10 @@ def test_wear_beyond_the_grid_is_refused_with_the_remedy() -> None:
 
 
 def test_partial_slip_over_a_given_stroke_is_that_of_mindlin() -> None:
-    """Method full: stroke and energy of Mindlin and Deresiewicz's loop at Q = 0.75 µP.
+    """Method full finds stroke and energy of Mindlin and Deresiewicz's loop at Q = 0.75 µP.
 
     cases/sphere_fretting.yaml has the closed forms: an amplitude of 6.69523 µm dissipates 0.414092
-    N mm a cycle; they neglect the shear across, 2 %.
+    N mm per cycle; they neglect the transverse shear, 2 %.
     """
     case = area(
         *("load_path.P=400 N", "load_path.stroke=13.39046 um", "load_path.increments=4"),
@@ -277,9 +277,9 @@ def test_a_run_writes_what_every_wear_run_does(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("dimension", [2, slow(3)])
 def test_moments_that_hold_the_tilt_are_results(dimension: int, tmp_path: Path) -> None:
-    """Of the places that a cylinder or a ball takes over its groove; the loads have none.
+    """A cylinder or a ball moves over its groove under moments that are results, not loads.
 
-    Read as loads of another code, they leave the tilt held.
+    Read as loads of another code, they hold the tilt.
     """
     text, small = (LINE, "contact.grid=[64, 1]") if dimension == 2 else (AREA, SMALL[0])
     case = tmp_path / "case.yaml"
@@ -333,7 +333,7 @@ def test_cases_of_the_repository_are_verified(name: str, tmp_path: Path) -> None
 
 
 def worn_over_50_um(folder: Path, step: str) -> tuple[dict[str, Any], list[str]]:
-    """The interface of a cylinder that slides over 50 µm, and what the run warned of."""
+    """Return the interface of a cylinder that slides over 50 µm, and the warnings of the run."""
     folder.mkdir()
     (folder / "case.yaml").write_text(LINE)
     steel = [f"materials.body_{n}={{young: 200 GPa, poisson: 0.3}}" for n in (1, 2)]
@@ -356,9 +356,9 @@ def worn_over_50_um(folder: Path, step: str) -> tuple[dict[str, Any], list[str]]
 
 @pytest.mark.slow
 def test_a_run_says_what_its_steps_leave_of_the_pressure(tmp_path) -> None:
-    """At the edges that long steps have worn pressure peaks, and what a run advises helps.
+    """Long steps cause pressure peaks at the worn edges, and the advised setting removes them.
 
-    151.9 MPa are left by 160 steps of second order, to 2 %; by more increments less.
+    160 steps of second order give 151.9 MPa to 2 %; more increments give less.
     """
     step, errors = "{kind: implicit, cycles: 6000}", []
     for number in range(2):
@@ -375,7 +375,7 @@ def test_a_run_says_what_its_steps_leave_of_the_pressure(tmp_path) -> None:
 
 
 def test_many_jumps_are_warned_of(tmp_path, monkeypatch) -> None:
-    """Once, with the setting that makes them fewer."""
+    """The warning appears once, with the setting that reduces the number of jumps."""
     monkeypatch.setattr(wear_run, "MANY_JUMPS", 2)
     warnings = worn_over_50_um(tmp_path / "run", "{kind: implicit, cycles: 4500}")[1]
     (line,) = (line for line in warnings if "wear jumps" in line)

@@ -1,4 +1,4 @@
-"""Stress of a body under its contact: its mesh, finer meshes, the other method, balances."""
+"""Tests of the stress of a body under its contact: meshes, the other method, balances."""
 
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -40,7 +40,7 @@ FLAT = Frame(np.zeros(3), np.eye(3))
 
 @dataclass
 class Flank:
-    """The unworn intrados of the section."""
+    """Unworn intrados of the section."""
 
     source: StructureLoads
     stage: FaceContact
@@ -64,7 +64,7 @@ class Flank:
         return cls(source, stage, cycle, given.unknown, Planes(case.stress, stage.grid), bodies)
 
     def history(self, body: int, cycle: StressedCycle | None = None) -> Array:
-        """Stress at the critical distance ``(t, 6, nx)``."""
+        """Return the stress at the critical distance ``(t, 6, nx)``."""
         cycle, stressed = cycle or self.cycle, self.bodies[body - 1]
         known = np.ones(len(self.stuck), dtype=bool)
         return stressed.history(cycle, stressed.bulk(cycle), DEPTH, known)[..., 0]
@@ -76,7 +76,7 @@ def coarse() -> Flank:
 
 
 def bare(cycle: StressedCycle) -> StressedCycle:
-    """The same without what the structure knows of its bodies."""
+    """Return the cycle without what the structure knows about its bodies."""
     return StressedCycle(cycle.tractions, cycle.loads)
 
 
@@ -110,7 +110,7 @@ def test_the_largest_tension_is_that_of_the_history(coarse: Flank, body) -> None
 
 @pytest.mark.parametrize("body", [1, 2])
 def test_below_one_element_it_is_that_of_the_mesh(coarse: Flank, body) -> None:
-    """Fine and nodal tractions differ by what balances itself over an element or two, of length h.
+    """Fine and nodal tractions differ by self-balanced tractions over a length h of 1-2 elements.
 
     Within the contact such a traction stresses a half-space like exp(-2πz/h); at the edge, where
     its moment does not vanish, like (h/z)² (Saint-Venant; Johnson 1985, 2.5).
@@ -156,7 +156,7 @@ def test_increments_that_stick_balance_their_shear(coarse: Flank) -> None:
 
 
 def test_unloaded_flanks_are_not_stressed(coarse: Flank) -> None:
-    """The last increment of the mission: nothing spins."""
+    """The stress vanishes in the last increment of the mission, in which nothing spins."""
     for body in (1, 2):
         history = coarse.history(body)
         assert np.abs(history[-1]).max() < 1e-9 * np.abs(history).max()
@@ -164,7 +164,7 @@ def test_unloaded_flanks_are_not_stressed(coarse: Flank) -> None:
 
 @pytest.mark.parametrize("body", [1, 2])
 def test_there_is_no_stress_where_the_body_is_not(body) -> None:
-    """A foot over x > 0 on a plate over x < 1, pressed all over a grid from -2 to 2 mm."""
+    """A foot over x > 0 on a plate over x < 1 is pressed, on a grid from -2 to 2 mm."""
     reach = {1: (-2.0, 1.0), 2: (0.0, 2.0)}
     faces, fields = {}, []
     for number, (low, high) in reach.items():
@@ -206,10 +206,11 @@ def test_there_is_no_stress_where_the_body_is_not(body) -> None:
     ids=["20 nodes", "as shipped"],
 )
 def test_a_fine_mesh_finds_the_same_next_to_the_face(settings, bounds) -> None:
-    """Tension along the face at 0.1 mm, where 320 nodes of order 2 (0.035 mm apart) resolve it.
+    """Tension along the face at 0.1 mm agrees with 320 nodes of order 2, 0.035 mm apart.
 
-    Of the largest, but for two cells at either edge of the contact: between these, and on to half
-    an element from the corners of the flank, where fillets begin. Half-spaces miss it by half.
+    The tolerance is relative to the largest value. It excludes two cells at either edge of the
+    contact, and the elements at the corners of the flank, where fillets begin. Half-spaces are off
+    by half.
     """
     depth = 0.1
     fine, found = Flank.of("mesh.flank_nodes=[320, 34]", "mesh.order=2"), Flank.of(*settings)
@@ -241,10 +242,7 @@ def test_a_fine_mesh_finds_the_same_next_to_the_face(settings, bounds) -> None:
 
 @pytest.mark.slow
 def test_where_it_sticks_it_is_as_with_friction_of_the_half_space() -> None:
-    """An independent method: shear below the resolution of the mesh is its own there.
-
-    Critical planes live from the extremes of a cycle, when the flank slides: 0.2 %.
-    """
+    """An independent method agrees; its shear below the resolution of the mesh is its own."""
     nodes = Flank.of()
     own = Flank.of("contact.method=full")
     assert nodes.stuck.max() > 0.9

@@ -1,4 +1,4 @@
-"""Bolts through the whole road: tightened, held, and what wear of what they clamp costs."""
+"""Tests of bolts in a complete run: tightening, holding, and the tension lost by wear."""
 
 import json
 
@@ -33,7 +33,7 @@ def written(folder, bodies):
 
 @pytest.fixture
 def clamp(tmp_path):
-    """A block between the beams of a frame with two rods, shaken along them."""
+    """Return a block between the beams of a frame with two rods, shaken along them."""
     x = along((0, 0.5, 1), (0.5, 2, 3), (2, 4, 8), (4, 5.5, 3), (5.5, 6, 1))
     whole = MeshTri.init_tensor(x, along((-BEAM, 0, 2), (0, HEIGHT, 8), (HEIGHT, HEIGHT + BEAM, 2)))
     middle = whole.p[:, whole.t].mean(axis=1)
@@ -85,7 +85,7 @@ def clamp(tmp_path):
 
 
 def test_wear_of_what_is_clamped_costs_tension(clamp, tmp_path):
-    """P of both faces is the tension; what is lost goes with the depth by the joint diagram."""
+    """P of both faces is the tension, and its loss follows the depth by the joint diagram."""
     settings = "wear.cycles=2e4", "wear.step.cycles=1e4", "coupling.resultants=every"
     numbers = run(clamp, tmp_path / "out", *settings)
     bolt = numbers["structure"]["bolts"]["rods"]
@@ -104,8 +104,8 @@ def test_wear_of_what_is_clamped_costs_tension(clamp, tmp_path):
         assert (np.diff(group["tension"]) < 0.0).all()
         assert group["tension_worn"].shape == (8,)
     worn = sum(numbers[face][f"volume_{k}"] for face in ("under", "over") for k in (1, 2)) / 2.0
-    # Per depth its tension over its shortening: exact where all of a face wears alike, and this one
-    # wears more at its ends, which are softer.
+    # Loss per depth is tension over shortening. This is exact for uniform wear of a face, whereas
+    # this one wears more at its ends, which are softer.
     stiffness = FORCE / bolt["shortening"]
     assert before - after == pytest.approx(stiffness * worn, rel=0.05)
 
@@ -125,7 +125,7 @@ def test_a_bolt_is_told_in_check_summary_and_report(clamp, tmp_path):
 
 @pytest.mark.slow
 def test_a_shortening_is_as_long_as_it_is(clamp, tmp_path):
-    """Twice as short, twice as tight."""
+    """Twice the shortening gives twice the tension."""
     gently = "structure.loads.1.force=[10 N, 0, 0]"
     short = {"kind": "shortening", "shortening": "4 um"}
     loads = json.dumps({k: v for k, v in TIGHT.items() if k != "force"} | short)

@@ -1,8 +1,8 @@
 """Every entry of a case refuses a wrong type, a wrong unit and a value out of range.
 
-The entries are found by walking the kinds of case there are, so that a new one cannot be forgotten.
-One that several sections inherit, or that stands in several places, is the same entry there: it is
-tried once, in the first of its places.
+The entries are found by walking all kinds of case, so that a new one cannot be forgotten. An entry
+that several sections inherit, or that appears in several places, is tested once, in the first of
+its places.
 """
 
 import math
@@ -32,13 +32,13 @@ from workflow.kinds import kinds, load_case, parse_case
 
 
 def load(leaf, folders, *overrides):
-    """The template of the leaf's kind with the overrides that it needs and more."""
+    """Load the template of the leaf's kind with the overrides that it needs and further ones."""
     path = folders[leaf.kind] / "case.yaml"
     return parse_case(TEMPLATE(leaf.kind), str(path), [*leaf.needed, *overrides])
 
 
 def refused(leaf, folders, value):
-    """The message that refuses ``value``: one line, which names the entry."""
+    """Return the message that refuses ``value``: one line, which names the entry."""
     try:
         load(leaf, folders, f"{leaf.key}={value}")
     except CaseError as refusal:
@@ -61,7 +61,7 @@ def test_walk_finds_the_leaves():
 
 
 def test_every_declared_entry_is_tried_once():
-    """Whatever place an entry stands in: none is left out, and none is tried again elsewhere."""
+    """Every declared entry is tested in exactly one of its places."""
     tried = [(leaf.declared, leaf.name) for entries in SECTIONS.values() for leaf in entries]
     assert len(set(tried)) == len(tried)
     assert set(tried) == {(leaf.declared, leaf.name) for leaf in PLACES}
@@ -97,7 +97,7 @@ def test_wrong_unit_is_refused(entries, folders):
 
 
 def limits(leaf) -> list[float]:
-    """The nearest values that are no longer within the limits of an entry."""
+    """Return the nearest values that are outside the limits of an entry."""
     entry = entry_of(leaf.field)
     if isinstance(entry, Whole):
         return [entry.at_least - 1, entry.at_most + 1]
@@ -142,7 +142,7 @@ BESIDE = {f"structure.matrices.{part}": [APART] for part in APART_MATRICES} | {
 
 
 def stated(leaf):
-    """Overrides that give an entry its example; what it takes the place of goes."""
+    """Return overrides that give an entry its example and remove the entries it replaces."""
     (example,) = leaf.field.examples
     example = str(example).lower() if isinstance(example, bool) else example
     plain = f"{leaf.key}={example}"
@@ -184,7 +184,7 @@ def test_example_is_accepted(entries, folders):
 
 
 def sections(node, path=(), place=()):
-    """Path and place of every section: the entry that holds it, and its model."""
+    """Yield path and place of every section: the entry that holds it, and its model."""
     if isinstance(node, BaseModel):
         yield path, (*place, type(node))
         for name in type(node).model_fields:
@@ -243,7 +243,7 @@ def test_quantities_arrive_in_base_units(dovetail_path, override, path, value):
 
 
 def test_any_dimension_goes_to_base_units(dovetail_path):
-    """N, mm, s, tonne are coherent: a work of 1 J is 1000 N mm, a power of 1 W is 1000 N mm/s."""
+    """N, mm, s and tonne are coherent: a work of 1 J is 1000 N mm, a power of 1 W 1000 N mm/s."""
     for text, value in (("1 J", 1e3), ("1 W", 1e3), ("2 GPa", 2e3), ("1 kg", 1e-3), ("3 um", 3e-3)):
         expect = [{**EXPECT[0], "value": text}]
         assert load_case(dovetail_path, [f"expect={expect}"]).expect[0].value == value
@@ -262,7 +262,7 @@ def test_case_is_frozen(dovetail_path):
 
 
 def test_sections_may_be_shared(dovetail_text):
-    """YAML's anchors: what is written once may stand in two places."""
+    """YAML anchors let a section that is written once appear in two places."""
     shared = dovetail_text.replace("  blade: {young", "  blade: &titanium {young")
     start = shared.index("  disk: {young")
     shared = shared[:start] + "  disk: *titanium" + shared[shared.index("\n", start) :]

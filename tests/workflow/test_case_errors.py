@@ -1,4 +1,4 @@
-"""A wrong case ends in exit code 2 and a line: file, line, key, what is wrong, what is allowed."""
+"""A wrong case ends with exit code 2 and one line: file, line, key, error and allowed values."""
 
 import os
 import re
@@ -139,7 +139,7 @@ UNREADABLE = [
 
 
 def refusal(arguments):
-    """The only line on stderr of a command that must end with exit code 2."""
+    """Return the only line on stderr of a command that must end with exit code 2."""
     result = CliRunner().invoke(cli, arguments)
     assert result.exit_code == 2, (result.stdout, result.stderr, result.exception)
     assert isinstance(result.exception, SystemExit)
@@ -183,7 +183,7 @@ def test_unreadable_file_is_told_in_one_line(tmp_path, raw, number, words):
 
 
 def no_files(folder):
-    """Names in a folder that lead to no file, by what is said of them."""
+    """Return paths in a folder that are no files, by the message expected for them."""
     (folder / "folder.csv").mkdir()
     (folder / "loop.csv").symlink_to("loop.csv")
     os.mkfifo(folder / "pipe.csv")
@@ -200,7 +200,7 @@ def no_files(folder):
 
 @posix_only
 def test_what_is_no_file_is_no_case_and_no_table(tmp_path):
-    """Nobody waits for what a pipe may say."""
+    """A pipe in place of a file is refused instead of waited for."""
     for name, words in no_files(tmp_path).items():
         for command in ("check", "loops"):
             line = refusal([command, str(tmp_path / name)])

@@ -1,4 +1,4 @@
-"""What is written reads back the same; the template is the default case."""
+"""Written cases are read back unchanged; the template is the default case."""
 
 import json
 import re
@@ -35,7 +35,7 @@ def test_dump_reads_back_equal(dovetail_path, overrides):
 
 
 def test_dump_keeps_the_units_of_what_is_expected(dovetail_path):
-    """Values of any dimension: the file of the run says of which."""
+    """Expected values may have any dimension, so the file of the run states their units."""
     expect = "[{quantity: a, value: 2.50 kN, tolerance: 0, kind: earlier, source: a}]"
     case = load_case(dovetail_path, [f"expect={expect}"])
     (again,) = parse_case(dump_case(case), "dump").expect
@@ -59,7 +59,7 @@ def test_dump_has_every_default(dovetail_path, dovetail_text):
 
 
 def test_numbers_are_numbers_in_every_yaml(dovetail_path):
-    """YAML 1.1, which most other readers speak, takes ``1e-08`` for a text."""
+    """YAML 1.1, which most other readers implement, reads ``1e-08`` as a text."""
     text = dump_case(load_case(dovetail_path))
     yaml = YAML(typ="safe", pure=True)
     yaml.version = (1, 1)
@@ -96,7 +96,7 @@ def test_template_has_every_entry(kind):
 
 
 def uncommented(text, *sections):
-    """``text`` with the optional ``sections`` filled in, each with the lines below it."""
+    """Return ``text`` with the optional ``sections`` filled in, each with the lines below it."""
     for section in sections:
         block = re.search(rf"^( *)# {section}:.*\n(?:\1#   .*\n)*", text, re.MULTILINE)
         opened = re.sub(rf"^{block[1]}# ", block[1], block[0], flags=re.MULTILINE)
@@ -132,7 +132,7 @@ def uncommented(text, *sections):
     ],
 )
 def test_template_works_without_its_comment_signs(kind, sections, values, template_files):
-    """Entries left in as comments are right as well."""
+    """Entries that the template has as comments are valid as well."""
     text = uncommented(template(kind), *sections, "assumed", "expect")
     case = parse_case(text, str(template_files / kind))
     for key, value in (values | {"expect.0.tolerance": 0.01}).items():

@@ -1,4 +1,4 @@
-"""Charts without runs: frontier, Richardson, ladders, costs with a cache, axes of each case."""
+"""Tests of charts without runs: frontier, Richardson, ladders, costs with a cache, axes."""
 
 import json
 from dataclasses import replace
@@ -117,13 +117,13 @@ GRID, METHOD = (next(axis for axis in AXES if axis.name == name) for name in ("g
 
 
 def point(name: str, step: float | None, values: dict[str, float], seconds: float) -> Point:
-    """A rung that took ten convolutions per second; ``own`` is the case as written."""
+    """Return a rung that took ten convolutions per second; ``own`` is the case as written."""
     cost = Cost(seconds, round(10 * seconds), 1)
     return Point(Rung(name, (f"a={name}",), step), name == "own", name, values, cost)
 
 
 def test_a_busy_machine_changes_no_choice():
-    """A coarser grid seems to take longer than a finer one, and is taken all the same."""
+    """A coarser grid is chosen even if it seems to take longer than a finer one."""
     errors = {"16": 0.3, "32": 0.008, "64": 0.002, "128": 0.0005}
     seconds = {"16": 2.0, "32": 5.0, "64": 4.0, "128": 6.0}
     points = [
@@ -147,7 +147,7 @@ def test_a_busy_machine_changes_no_choice():
 
 
 def second_order(closed: float = 1.0) -> list[Point]:
-    """depth = closed + h², volume = 2 + h."""
+    """Return a ladder with depth = closed + h² and volume = 2 + h."""
     names = {"coarse": 0.4, "own": 0.2, "fine": 0.1}
     return [
         point(name, h, {"depth": closed + h**2, "volume": 2.0 + h}, 1.0 / h)
@@ -243,7 +243,7 @@ def test_files_of_a_chart(tmp_path: Path):
 
 
 def test_figures_of_odd_ladders(tmp_path: Path):
-    """Nothing but a reference, no convolutions, an unknown floor."""
+    """Ladders with only a reference, without convolutions or with an unknown floor are drawn."""
     alone = judge(GRID, [point("own", 1.0, {"depth": 1.0}, 0.01)], {}, {})
     empty = Ladder(METHOD, (), {}, {"own": "failed"})
     chart = Chart("Odd", (alone, empty), 0.01)
@@ -254,7 +254,7 @@ def test_figures_of_odd_ladders(tmp_path: Path):
 
 
 def test_names_of_a_crowded_chart_leave_each_other_room():
-    """Those of the case as written and the efficient ones come first; it is on no one's line."""
+    """The case as written and efficient points are labelled first; labels cover no line."""
     crowd = [(f"rung {k:02}", 1.0 + k, 0.2 + 0.01 * (k % 7), 9.0 + k) for k in range(20)]
     alone, finer, finest = (
         ("own", None, 0.05, 30.0),
@@ -298,7 +298,7 @@ def test_seconds_of_the_log_by_stage():
 
 
 def test_what_is_found_in_the_cache_costs_what_it_took_to_compute(tmp_path: Path, small_path: Path):
-    """The second run shares everything structural, the third the condensation alone."""
+    """The second run shares all structural work, the third only the condensation."""
     overrides = ((), ("contact.grid=[16, 32]",), ("load_path.increments=[9, 15]",))
     cases = [load_case(small_path, entries) for entries in overrides]
     logged = ("8.00", "3.00"), ("0.10", "0.20"), ("0.10", "6.00")
@@ -371,7 +371,7 @@ def test_every_rung_of_every_case_is_another_case_and_finer(path: Path):
 
 
 def _check_steps(axis: Axis, settings: list) -> None:
-    """Rungs of a branch go from coarse to fine."""
+    """Assert that the rungs of a branch go from coarse to fine."""
     branches: dict[str, list[float]] = {}
     for setting in settings:
         if setting.rung.step is not None:

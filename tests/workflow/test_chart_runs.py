@@ -1,4 +1,4 @@
-"""Charts of runs: of a contact whose errors are known, of made-up ones, and of one cut off."""
+"""Tests of charts with runs: a contact with known errors, artificial runs, interruptions."""
 
 import csv
 import json
@@ -58,7 +58,7 @@ def ball(tmp_path: Path) -> Path:
 
 
 def in_process(run: Callable[[Job, Path], None]) -> RunJobs:
-    """What runs the jobs of a chart by a function, here and now."""
+    """Return a function that runs the jobs of a chart in this process."""
 
     def run_jobs(
         jobs: Sequence[Job],
@@ -85,7 +85,7 @@ def in_process(run: Callable[[Job, Path], None]) -> RunJobs:
 
 
 def chart(case: Path, out: Path, *options: str) -> Result:
-    """``fretscale chart`` in this process."""
+    """Call ``fretscale chart`` in this process."""
     result = CliRunner().invoke(cli, ["chart", str(case), "--out", str(out), *options])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result
@@ -153,9 +153,9 @@ def test_a_folder_of_something_else_is_left_alone(ball: Path, tmp_path: Path):
 
 
 class MadeUp:
-    """Runs whose depth has known errors: of the grid, of the jumps, of two dimensions.
+    """Artificial runs whose depth has known errors: of the grid, of the jumps, of two dimensions.
 
-    Condensation takes 8 s and is found in 0.1 s by the next; the explicit limit is 1 cycle.
+    Condensation takes 8 s, or 0.1 s if it is cached; the explicit limit is 1 cycle.
     """
 
     def __init__(self, explicit_limit: float) -> None:
@@ -216,7 +216,7 @@ def made_up(
     limit: float = 1e3,
     **settings: Any,
 ) -> tuple[MadeUp, dict[str, Ladder]]:
-    """The ladders of made-up runs, by axis."""
+    """Return the ladders of artificial runs, by axis."""
     runs = MadeUp(limit)
     monkeypatch.setattr(workflow.chart.run, "run_jobs", in_process(runs))
     charted = chart_case(case, out, **settings)
@@ -243,7 +243,7 @@ def test_every_different_case_runs_once_and_the_own_one_first(
 def test_increments_that_are_auto_are_chosen_once(
     small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """And stay on the rungs of another axis, whatever these would ask for."""
+    """They stay the same on the rungs of other axes."""
     auto = {"axes": ("increments", "mesh"), "overrides": ("load_path.increments=auto",)}
     runs, ladders = made_up(monkeypatch, small_path, tmp_path, **auto)
     own = runs.ran[0].load().load_path
@@ -316,8 +316,7 @@ def test_quantities_can_be_picked(
 
 @pytest.mark.slow
 def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Implicit steps are of an order between the first and the second; those of second order are
-    better at the same length."""
+    """Implicit steps have an order between one and two; second-order ones are better."""
     longer = ROLLER_WEAR.replace("  cycles: 4e4", "  cycles: 1e5")
     (tmp_path / "line.yaml").write_text(longer, encoding="utf-8")
     (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
@@ -331,7 +330,7 @@ def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     errors = {rung.name: rung.error for rung in ladder.rungs}
     first = [errors[f"implicit, {count} jumps"] for count in (5, 10, 20)]
     for coarse, fine in pairwise(first):
-        # To and fro over unlike increments: see wear.steps.implicit.
+        # Forward and backward over different increments: see wear.steps.implicit.
         assert 0.8 < np.log2(coarse / fine) < 2.0
     assert errors["second order, 10 jumps"] < 0.1 * errors["implicit, 10 jumps"]
     assert [rung.name for rung in ladder.rungs if rung.point.baseline] == ["implicit, 10 jumps"]

@@ -1,4 +1,4 @@
-"""The command: what it prints, how fast it answers, and how each ending leaves it."""
+"""Tests of the command: its output, its response time, and its endings."""
 
 import shutil
 import subprocess
@@ -45,7 +45,7 @@ print("\\nIMPORTED", *({{name.partition(".")[0] for name in set(sys.modules) - b
 
 
 def test_case_without_units_needs_no_pint(dovetail_path, tmp_path):
-    """Importing pint takes longer than everything else that reads a case."""
+    """Importing pint would take longer than the rest of reading a case."""
     from workflow.case.writing import dump_case
 
     path = tmp_path / "bare.yaml"
@@ -78,7 +78,7 @@ def test_check_says_what_would_run(dovetail_path):
 
 
 def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
-    """Both flanks condensed onto 90,000 degrees of freedom: 400 GB of dense matrices."""
+    """Both flanks condensed onto 90,000 degrees of freedom need 400 GB of dense matrices."""
     result = invoke("check", dovetail_path, "--set", "mesh.flank_nodes=[100, 150]")
     assert result.exit_code == 4
     assert "mesh.flank_nodes" in result.stderr
@@ -117,7 +117,7 @@ def test_new_writes_a_case_that_checks(tmp_path, template_files, kind, words):
 @pytest.mark.parametrize("options", [[], ["--short"]])
 @pytest.mark.parametrize("kind", [*kinds(), "sweep"])
 def test_new_brings_what_the_case_names(kind, options, tmp_path):
-    """All but the mesh of the user's own structure; each example is a right case too."""
+    """All files except the mesh of a user's structure are written; examples are valid cases."""
     path = tmp_path / "mine.yaml"
     if kind == "sweep":
         options = []

@@ -1,4 +1,4 @@
-"""Finished runs side by side: what is alike, what differs, and by more than errors."""
+"""Tests of the comparison of finished runs: equal entries, differences, and their errors."""
 
 import csv
 
@@ -28,7 +28,7 @@ ageing: {cycles: 1000}
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """Folders of finished runs, by name: a ball, one of more friction, the first again, a joint."""
+    """Return folders of finished runs: a ball, one with more friction, the first again, a joint."""
     folder = tmp_path_factory.mktemp("compared")
     cases = {
         "ball": (BALL, ()),
@@ -115,7 +115,7 @@ def test_a_program_compares_as_the_command_does(runs, tmp_path):
 
 
 def test_values_in_different_units_are_not_beside_each_other(runs, tmp_path):
-    """Of a cylinder forces are per length."""
+    """The forces of a cylinder are per length."""
     line = BALL.replace("sphere, radius: 10 mm", "cylinder, radius: 10 mm")
     line = line.replace("[16, 16], size: [1 mm, 1 mm]", "64, size: 1 mm")
     line = line.replace("400 N", "400 N/mm")
@@ -156,7 +156,7 @@ def test_runs_of_one_name_are_told_apart_by_where_they_are(runs, tmp_path):
 
 
 def test_curves_are_found_by_patterns(tmp_path):
-    """Any group, the last numbered one, the last column, and the middle of a field."""
+    """Patterns find any group, the last numbered one, the last column, the middle of a field."""
     with h5py.File(tmp_path / "results.h5", "w") as file:
         for force, name in ((10.0, "00000"), (30.0, "00001")):
             group = file.create_group(f"responses/{name}")

@@ -1,4 +1,4 @@
-"""What a shell is told when a command is completed."""
+"""Tests of the shell completion of a command."""
 
 import os
 import subprocess
@@ -15,7 +15,7 @@ VARIABLE = "_FRETSCALE_COMPLETE"
 
 
 def completed(*words):
-    """Value and type of what the last of the words may become."""
+    """Return value and type of the possible completions of the last word."""
     shell = BashComplete(cli, {}, "fretscale", VARIABLE)
     return [(c.value, c.type) for c in shell.get_completions(list(words[:-1]), words[-1])]
 
@@ -38,7 +38,7 @@ def test_kinds_are_completed():
     ],
 )
 def test_files_are_completed(words):
-    """By the shell itself: it is told that a file stands here."""
+    """The shell completes files itself: it receives the type of the word."""
     assert completed(*words, "ca") == [("ca", "file")]
 
 
@@ -48,7 +48,7 @@ def test_folders_are_completed():
 
 
 def test_a_shell_gets_its_script():
-    """And no word about a pipe: ``eval "$(_FRETSCALE_COMPLETE=zsh_source fretscale)"``."""
+    """``eval "$(_FRETSCALE_COMPLETE=zsh_source fretscale)"`` gives no message about a pipe."""
     ended = subprocess.run(
         [sys.executable, "-c", "from workflow.cli import main; main()"],
         env={**os.environ, VARIABLE: "zsh_source"},

@@ -1,4 +1,4 @@
-"""Contact cases: what they refuse, in one line each, and the path and files they are read to."""
+"""Tests of contact cases: refusals in one line each, and the path and files that are read."""
 
 import re
 
@@ -148,7 +148,7 @@ def test_legs_are_passed_at_equal_steps_and_keep_what_they_do_not_name():
 
 
 def test_returning_legs_return_exactly():
-    """The loop is found by equal loads: 0.1 + 0.2 must not come in between."""
+    """The loop is found by equal loads, which 0.1 + 0.2 must not disturb."""
     legs = "".join(f"    - {{Qx: {q}, increments: 7}}\n" for q in (0.3, -0.1, 0.3))
     text = BALL.replace("    - {Qx: 210 N, increments: 4}\n", legs)
     force = parse_case(text, "case.yaml").load_path.table()["Qx"]
@@ -165,7 +165,7 @@ def test_bulk_stress_strains_each_body_by_its_own_stiffness():
 
 
 def with_file(base):
-    """The case with its path in ``history.csv``."""
+    """Return the case with its path in ``history.csv``."""
     start, end = base.index("\n  legs:"), base.index("\ncontact")
     return base[:start] + " {file: history.csv}" + base[end:]
 
@@ -252,7 +252,7 @@ def test_gaps_of_the_shapes():
 
 @pytest.fixture
 def heights(tmp_path):
-    """The same heights in every kind of file."""
+    """Return the same heights in every kind of file."""
     values = np.arange(16.0 * 16.0).reshape(16, 16) / 7.0
     np.save(tmp_path / "gap.npy", values)
     np.savetxt(tmp_path / "gap.csv", values, delimiter=",", fmt="%.17g")

@@ -1,4 +1,4 @@
-"""``fretscale check --out``: the picture of where contact faces are."""
+"""Tests of ``fretscale check --out``: the picture of the positions of contact faces."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.usefixtures("reads_here")
 
 
 def test_faces_are_drawn_where_they_are(blocks):
-    """The foot of 1 mm stands in the middle of the base of 2 mm: a quarter of it is shared."""
+    """The foot of 1 mm is at the middle of the base of 2 mm, so a quarter of it is shared."""
     case = load_case(blocks)
     assert isinstance(case, MeshCase)
     drawn = figure(case.structure.mesh(None), case.title)

@@ -1,4 +1,4 @@
-"""Tangential loops of a wear run: what is imposed, kept, written, and drawn."""
+"""Tests of tangential loops of a wear run: how they are imposed, stored, written and drawn."""
 
 import os
 import shutil
@@ -72,12 +72,12 @@ stress: {section: none, life: {parameter: none}}
 output: {paraview: false, figures: false}
 """
 AMPLITUDE = 0.01
-# Coarse loops: they are to be kept, not to be accurate.
+# Coarse loops, because only their storage is tested, not their accuracy.
 ASKED = f"loops.amplitude={AMPLITUDE} mm", "loops.increments=3"
 
 
 def state(P=400.0, Mx=0.0, My=0.0, grid=None):
-    """An interface before wear, its peak load in the second of two increments."""
+    """Return an interface before wear, with its peak load in the second of two increments."""
     loads = SimpleNamespace(
         **{k: np.array([0.0, v]) for k, v in (("P", P), ("Mx", Mx), ("My", My))}
     )
@@ -87,7 +87,7 @@ def state(P=400.0, Mx=0.0, My=0.0, grid=None):
 
 @pytest.fixture(scope="module")
 def sphere():
-    """A loop of a sphere in partial slip."""
+    """Return a loop of a sphere in partial slip."""
     size = 2.2 * SPHERE.contact.contact_radius
     grid = Grid.covering((size, size), (32, 32))
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
@@ -136,7 +136,7 @@ def test_both_drives_are_refused(small_path):
 
 
 def test_values_are_those_of_the_loop(sphere):
-    """Mindlin's, to what 32 cells leave."""
+    """The values are Mindlin's within the error of 32 cells."""
     values = sphere.values
     assert tuple(values) == MEASURED
     assert values["energy"] == 1500.0
@@ -163,7 +163,7 @@ def test_force_beyond_friction_ends_the_run_in_one_line():
 
 
 def with_loops(root, loop, line=False):
-    """Results with loops of jumps 0 and 2, as after ``every: end``."""
+    """Return results with loops of jumps 0 and 2, as after ``every: end``."""
     folder = OutputFolder(root)
     folder.jumps.mkdir(parents=True)
     for jump in range(3):
@@ -203,7 +203,7 @@ def test_results_have_the_loops_of_their_jumps(written, sphere):
 
 
 def test_computed_loops_are_read_as_measured_ones(tmp_path):
-    """The slope after the reversals is Mindlin's, but for the parabola's 0.4 % and 16 cells."""
+    """The slope after reversals is Mindlin's within the parabola's 0.4 % and 16 cells."""
     size = 2.2 * SPHERE.contact.contact_radius
     grid = Grid.covering((size, size), (16, 16))
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
@@ -276,7 +276,7 @@ def test_warning_of_a_contact_that_outgrows_its_grid():
 
 @pytest.fixture(scope="module")
 def start_balls(tmp_path_factory):
-    """Runs the two balls with overrides."""
+    """Return a function that runs the two balls with overrides."""
     case = tmp_path_factory.mktemp("balls") / "balls.yaml"
     case.write_text(BALLS, encoding="utf-8")
     (case.parent / "loads.csv").write_text(LOADS, encoding="utf-8")
@@ -290,14 +290,14 @@ def start_balls(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def rubbed(start_balls, tmp_path_factory):
-    """The balls with a loop after every jump, not to be changed."""
+    """Return a run of the balls with a loop after every jump, which tests must not change."""
     run = start_balls(tmp_path_factory.mktemp("rubbed") / "out", *ASKED)
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
 
 
 def test_loops_are_read_only_of_a_run_as_it_was_written(rubbed, tmp_path):
-    """Three increments are too few to be read as a record; a damaged file is not believed."""
+    """Three increments are too few for a record; a damaged file is refused."""
     refused = invoke("loops", rubbed.folder)
     assert (refused.exit_code, "more loops.increments" in refused.stderr) == (2, True)
     shutil.copytree(rubbed.folder, tmp_path / "cut")
@@ -348,7 +348,7 @@ def test_loops_change_nothing_else(start_balls, rubbed, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("every", ["end", "jump"])
 def test_resumed_run_keeps_its_earlier_loops(start_balls, resume, rubbed, tmp_path, every):
-    """The same loops as without the interruption; with ``end`` the first and the last of them."""
+    """The loops equal those of an uninterrupted run; with ``end`` the first and last are stored."""
     with ctrl_c_after_jumps(2):
         begun = start_balls(tmp_path / "out", *ASKED, f"loops.every={every}")
         assert begun.ending.exit_code == 130
@@ -361,5 +361,5 @@ def test_resumed_run_keeps_its_earlier_loops(start_balls, resume, rubbed, tmp_pa
 
 
 def test_linear_regime_says_where_it_leads(rubbed):
-    """Three jumps are too few for a regime: the summary says so."""
+    """Three jumps are too few for a linear regime, and the summary says so."""
     assert rubbed.summary["left"]["linear_regime"] == {"depth": None, "volume": None}

@@ -1,4 +1,4 @@
-"""Summary, results, figures and ParaView files of contact runs, from closed-form states."""
+"""Tests of summary, results, figures and ParaView files of contact runs, from closed forms."""
 
 import json
 import shutil
@@ -53,7 +53,7 @@ LUBKIN = TwistedSphere(LOAD, RADIUS, MATERIAL, MATERIAL, FRICTION)
 
 
 def state(shear, resultants, rigid, energy=0.0, grid=GRID, pressure=None):
-    """A state as the solver gives it; fields that do not matter are 0."""
+    """Return a state as the solver would; irrelevant fields are 0."""
     hertz = MINDLIN.contact.pressure(grid.x, grid.y) if pressure is None else pressure
     return SimpleNamespace(
         traction=np.stack([*shear, hertz]),
@@ -77,7 +77,7 @@ def history(states, indices=None, method="full"):
 
 
 def turning_points(forces):
-    """The turning points that lead to each of ``forces``."""
+    """Return the turning points that lead to each of ``forces``."""
     turns = []
     for before, now, after in zip(forces, forces[1:], [*forces[2:], None], strict=False):
         if after is not None and (now - before) * (after - now) < 0.0:
@@ -86,7 +86,7 @@ def turning_points(forces):
 
 
 def mindlin_state(forces):
-    """The state after Q went through ``forces``."""
+    """Return the state after Q went through ``forces``."""
     loads = [*turning_points(forces), forces[-1]] if any(forces) else []
     zero = np.zeros(GRID.shape)
     shear = MINDLIN.shear_after(GRID.x, GRID.y, loads) if loads else zero
@@ -101,7 +101,7 @@ def mindlin_state(forces):
 
 @pytest.fixture(scope="module")
 def outcome():
-    """Cattaneo and Mindlin's cycle, every increment of it."""
+    """Return Cattaneo and Mindlin's cycle with all its increments."""
     case = parse_case(CASE, "case.yaml")
     table = case.load_path.table()
     forces = table["Qx"].tolist()
@@ -122,7 +122,7 @@ def folder(outcome, tmp_path_factory):
 
 
 def test_state_has_the_measures_of_the_closed_form(outcome):
-    """Radii are counted in cells: within half a per cent at 36 cells to the radius."""
+    """Radii from counted cells are within 0.5 % at 36 cells per radius."""
     summaries = state_summaries(GRID, FRICTION, outcome.history)
     assert json.loads(json.dumps(summaries, allow_nan=False)) == summaries
     last, contact = summaries[-1], MINDLIN.contact
@@ -177,7 +177,7 @@ def loop(outcome, **changes):
 
 
 def test_loop_is_the_last_closed_cycle(outcome):
-    """Trapezoids between 12 points from end to end: the area within 2 %."""
+    """Trapezoids between 12 points from end to end give the area within 2 %."""
     summary = loop(outcome)
     assert (summary["from_increment"], summary["to_increment"]) == (1 + STEPS, 1 + 3 * STEPS)
     assert (summary["force"], summary["motion"]) == ("Qx", "shift_x")
@@ -202,7 +202,7 @@ def test_loop_of_turning_points_has_no_area(outcome):
 
 
 def test_path_that_does_not_come_back_has_no_loop(outcome):
-    """Q = 0 on the way down is not the unloaded state again: shear is locked in."""
+    """Q = 0 on the way down is not the unloaded state, since shear is locked in."""
     count = 1 + STEPS + STEPS // 2
     states, indices = outcome.history.states[:count], outcome.history.indices[:count]
     assert outcome.table["Qx"][count - 1] == 0.0

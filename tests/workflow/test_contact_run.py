@@ -1,4 +1,4 @@
-"""Contact cases from the command line: what they leave, how they fail, and what they reproduce."""
+"""Tests of contact cases from the command line: their files, failures and references."""
 
 import json
 import re
@@ -56,7 +56,7 @@ def summary_of(folder):
 
 
 def states(count, **last):
-    """States of a contact that does nothing, the last one with changes."""
+    """Return states of an idle contact, the last one with changes."""
     nothing = {
         "traction": np.zeros((3, 32, 32)),
         "slip": np.zeros((2, 32, 32)),
@@ -76,7 +76,7 @@ def states(count, **last):
 
 @pytest.fixture
 def solver(monkeypatch):
-    """A solver that returns these states."""
+    """Replace the solver by one that returns these states."""
 
     def stand_in(computed):
         history = History(computed, list(range(len(computed))), "full", "asked for")
@@ -175,7 +175,7 @@ def test_too_many_cells_are_refused_before_anything_is_done(monkeypatch, small, 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The small case with every file, not to be changed."""
+    """Return a run of the small case with every file, which tests must not change."""
     folder = tmp_path_factory.mktemp("whole")
     path = folder / "small.yaml"
     path.write_text(SMALL, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Elements of a mesh file with its midside nodes: what is told of them, and Hertz with them."""
+"""Tests of mesh files with midside nodes: messages, and Hertz contact with such elements."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.usefixtures("reads_here")]
     [(2, 2, 0.015), pytest.param(3, 0, 0.03, marks=pytest.mark.slow)],
 )
 def test_hertz_of_curved_elements(tmp_path, dimension: int, order: int, rel: float):
-    """A second-order mesh, and a CAD file; in space four nodes carry the load."""
+    """A second-order mesh and a CAD file give Hertz; in space four nodes carry the load."""
     case = pressed(tmp_path, dimension, order)
     summary = run(case, tmp_path / "out", "mesh.order=2")
     assert summary["sole"]["peak_pressure"]["unworn"] == pytest.approx(PEAK[dimension], rel=rel)
@@ -30,7 +30,7 @@ def test_hertz_of_curved_elements(tmp_path, dimension: int, order: int, rel: flo
 
 
 def test_a_check_says_what_is_used_of_midsides(tmp_path):
-    """Nothing of a file without them, unless elements of second order are asked for."""
+    """A file without midside nodes is not mentioned, unless second order is requested."""
     case = pressed(tmp_path, 2, 1)
     assert "midside" not in invoke("check", case).output
     said = " ".join(invoke("check", case, "--set", "mesh.order=2").output.split())

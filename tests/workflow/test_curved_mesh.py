@@ -1,4 +1,4 @@
-"""A cylinder and a ball that are meshed, pressed on a plane: Hertz, whatever the file is."""
+"""Tests of a meshed cylinder and ball pressed on a plane: Hertz, whatever the file format."""
 
 import re
 from itertools import pairwise
@@ -32,7 +32,7 @@ GRID = {2: (512, 1), 3: (128, 128)}
 
 
 def bodies(gmsh, dimension):
-    """A block and a segment of a cylinder or a cap of a ball on it: two tags."""
+    """Return the tags of a block and of a segment of a cylinder or a cap of a ball on it."""
     occ = gmsh.model.occ
     if dimension == 2:
         block, foot = occ.addRectangle(-15, -12, 0, 30, 12), segment(occ)
@@ -45,7 +45,7 @@ def bodies(gmsh, dimension):
 
 
 def segment(occ):
-    """12 x 10 mm, with an arc below; what touches ends before the corners."""
+    """Return a segment of 12 x 10 mm with an arc below; the contact ends before the corners."""
     centre = occ.addPoint(0, RADIUS, 0)
     ends = [occ.addPoint(x, RADIUS - np.sqrt(RADIUS**2 - x**2), 0) for x in (-6, -5, 5, 6)]
     arcs = [occ.addCircleArc(start, centre, end) for start, end in pairwise(ends)]
@@ -55,7 +55,7 @@ def segment(occ):
 
 
 def sides(gmsh, dimension, body):
-    """Boundaries of a body with the height of their centre."""
+    """Return the boundaries of a body with the heights of their centres."""
     up = 1 if dimension == 2 else 2
     return {
         tag: gmsh.model.occ.getCenterOfMass(dim, tag)[up]
@@ -64,7 +64,7 @@ def sides(gmsh, dimension, body):
 
 
 def meshed(path: Path, dimension: int, order: int) -> dict[str, str]:
-    """Write both bodies as a mesh, or for order 0 as CAD; the names of bodies and faces."""
+    """Write both bodies as a mesh, or for order 0 as CAD; return the names of bodies and faces."""
     with gmsh_model("bodies") as gmsh:
         block, foot = bodies(gmsh, dimension)
         below, above = sides(gmsh, dimension, block), sides(gmsh, dimension, foot)
@@ -106,7 +106,7 @@ def meshed(path: Path, dimension: int, order: int) -> dict[str, str]:
 
 
 def named_by_cad(path: Path) -> dict[str, str]:
-    """Solids and faces of a CAD file, by where they are."""
+    """Return the names of solids and faces of a CAD file, found by their positions."""
     names = {"block": "solid_1", "foot": "solid_2"}
     for solid, low, high in (("solid_1", "base", "seat"), ("solid_2", "sole", "head")):
         body = read_bodies(path, SIZE[3]).bodies[solid]
@@ -116,7 +116,7 @@ def named_by_cad(path: Path) -> dict[str, str]:
 
 
 def pressed(folder: Path, dimension: int, order: int) -> Path:
-    """The case of a foot that is pressed and moved to and fro, too little to slide."""
+    """Write the case of a foot that is pressed and moved back and forth without sliding."""
     file = folder / ("bodies.msh" if order else "bodies.step")
     names = meshed(file, dimension, order)
     structure = {
@@ -159,9 +159,9 @@ def pressed(folder: Path, dimension: int, order: int) -> Path:
     ],
 )
 def test_hertz_of_a_mesh_that_is_coarser_than_the_contact(tmp_path, dimension: int, order: int):
-    """Facets alone would give 955 MPa where Hertz has 540, and more where one of them is hit.
+    """Facets alone would give 955 MPa instead of Hertz's 540 MPa, or more on a facet.
 
-    So few nodes are told, by number and name.
+    The small number of nodes is reported, by number and name.
     """
     case = pressed(tmp_path, dimension, order)
     summary = run(case, tmp_path / "out")
@@ -173,7 +173,7 @@ def test_hertz_of_a_mesh_that_is_coarser_than_the_contact(tmp_path, dimension: i
 
 @pytest.mark.slow
 def test_vertices_that_are_off_their_surface_are_told(tmp_path):
-    """What their form may do to the peak pressure is no less than what it does."""
+    """The reported effect on the peak pressure is at least the actual one."""
     case = pressed(tmp_path, 2, 1)
     with gmsh_model("moved") as gmsh:
         gmsh.open(str(tmp_path / "bodies.msh"))
@@ -193,7 +193,7 @@ def test_vertices_that_are_off_their_surface_are_told(tmp_path):
 
 
 def test_a_check_says_how_a_face_is_curved(tmp_path):
-    """Outer facets are 2 mm long, 17 µm off their circle."""
+    """Outer facets are 2 mm long, and their chords deviate from the circle by 17 µm."""
     case = pressed(tmp_path, 2, 1)
     said = invoke("check", case).output
     assert "body 2 up to" in said
@@ -210,9 +210,9 @@ def test_a_check_says_how_a_face_is_curved(tmp_path):
 
 @pytest.mark.parametrize("method", ["normal", pytest.param("full", marks=pytest.mark.slow)])
 def test_scar_of_a_cylinder_that_slides(tmp_path, method: str):
-    """As that of the cylinder in closed form, worn over the stroke that is left of the bodies' own.
+    """The scar equals that of a cylinder in closed form, worn over the relative stroke.
 
-    Its upright sides are moved by 20 µm to and fro; 3.3 of these are their elastic deformation.
+    The upright sides move by 20 µm back and forth; elastic deformation takes up 3.3 µm of it.
     """
     case, cycles = pressed(tmp_path, 2, 2), 1e5
     moved = "{kind: displacement, group: sides, displacement: [20 um, 0, 0], path: [0, 1, -1]}"

@@ -1,4 +1,4 @@
-"""Contacts cut by planes of symmetry: mesh cases of a part of both bodies and of all of them."""
+"""Tests of contacts cut by planes of symmetry: mesh cases of a part and of the whole."""
 
 import h5py
 import numpy as np
@@ -18,7 +18,7 @@ SAME = 1e-5
 
 
 def test_hertz_from_half_a_cylinder(tmp_path):
-    """Blocks 40 times as thick as the contact is wide, on half of which P is half as large."""
+    """Blocks are 40 times as thick as the contact is wide; half of them carry P/2."""
     blocks = Blocks((0, 80), 80, (0, 80), 80, (0, 2.5), materials=({}, {}), strips=4096, half=True)
     modulus = 200e3 / (2.0 * (1.0 - 0.3**2))
     load, peak = np.pi * modulus / (4.0 * RADIUS), 0.5 * modulus / RADIUS  # 1 mm to either side
@@ -35,18 +35,18 @@ PRESS = {"kind": "pressure", "group": "pad_lid", "pressure": 60, "path": [1, 1, 
 
 
 def pushed(planes):
-    """Along x to and fro, by 60 N in all."""
+    """Return loads along x, back and forth, by 60 N in total."""
     force = [60.0 * 0.5 ** len(planes), 0, 0]
     return {"kind": "force", "group": "pad_lid", "force": force, "path": [0, 1, -1, 1]}
 
 
 def stretched(planes):
-    """Along x to and fro, both sides of the pad by alike tractions."""
+    """Return equal tractions along x, back and forth, on both sides of the pad."""
     return {"kind": "pressure", "group": "pad_rims", "pressure": -60, "path": [0, 1, -1, 1]}
 
 
 def write(folder, planes, load=pushed, match=True, gap=None, **changes):
-    """The pad on its block, cut by ``planes``, pressed on and then under another load."""
+    """Write the pad on its block, cut by ``planes``, pressed and then under another load."""
     bodies, name = pad_on_block(planes, match), f"cut{len(planes)}"
     write_msh(folder / f"{name}.msh", StructureMesh(bodies, ()))
     cuts = [(body.name, "xy"[axis]) for axis in planes for body in bodies]
@@ -68,7 +68,7 @@ def write(folder, planes, load=pushed, match=True, gap=None, **changes):
 
 
 def told(out):
-    """Fields on the grid and load histories that a run has left, by their names."""
+    """Return fields on the grid and load histories of a run, by their names."""
     found = {}
 
     def keep(name, item):
@@ -91,7 +91,7 @@ def told(out):
     ],
 )
 def test_part_wears_as_the_whole_does(tmp_path, monkeypatch, planes, load, match, method, order):
-    """Pressures, shears, slips, worn surfaces, loads, life and their errors, and half the mesh."""
+    """Pressures, shears, slips, surfaces, loads, life and errors agree; the mesh is halved."""
     # As many cycles of either: what closes within CLOSED in two may be told to go on in the other.
     monkeypatch.setattr(structure, "CLOSED", -1.0)
     monkeypatch.setattr(structure, "MOST_CYCLES", 3)
@@ -132,7 +132,7 @@ ODD = {(1,): {"Qy", "Mx", "Mz"}, (0, 1): {"Qx", "Qy", "Mx", "My", "Mz"}}
 
 
 def test_heights_of_another_shape_beyond_the_plane_are_refused(tmp_path):
-    """They are those of the whole face, and half of them would be left out."""
+    """The heights are those of the whole face, half of which would be ignored."""
     gap = np.add.outer(np.linspace(0.0, 1e-3, 16), np.zeros(16))
     np.save(tmp_path / "gap.npy", gap)
     heights = {"shape": "heights", "file": "gap.npy"}

@@ -1,4 +1,4 @@
-"""A mesh case of one sector of a wheel: run, told and refused."""
+"""Tests of a mesh case of one sector of a wheel: runs, reports and refusals."""
 
 import pytest
 
@@ -30,7 +30,7 @@ LEGS = {"increments": [1, 2, 2]}
 
 
 def case_of(folder, moved=0.0, **changes):
-    """A case of a sector with its shoe, in the plane."""
+    """Write a case of a sector with its shoe, in the plane."""
     body = turned(shoe(SECTORS, COUNTS), CYCLIC, 0)
     file = folder / "sector.msh"
     write_msh(file, StructureMesh((sector(SECTORS, COUNTS, moved=moved), body), ()))
@@ -40,7 +40,7 @@ def case_of(folder, moved=0.0, **changes):
 
 @pytest.mark.parametrize("order", [1, slow(2)])
 def test_sector_runs(tmp_path, order):
-    """With its cuts tied; what is tied is told beforehand."""
+    """The run ties the cuts and announces what is tied."""
     case, elements = case_of(tmp_path), f"mesh.order={order}"
     told = invoke("check", case).output
     assert "one of 4: wheel_low and wheel_high match node to node" in told
@@ -79,5 +79,5 @@ def test_cuts_that_do_not_match_run(tmp_path):
     ],
 )
 def test_wrong_cuts_are_refused(tmp_path, overrides, said):
-    """In one line that names the entry."""
+    """The refusal is one line that names the entry."""
     assert said in refused(case_of(tmp_path), *overrides)

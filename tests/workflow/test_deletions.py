@@ -1,4 +1,4 @@
-"""Every entry of every template, left out: refused by its name, or ``check`` says what is taken."""
+"""Entries of templates are left out: they are refused by name, or ``check`` shows the default."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_an_example_is_that_of_the_entry(override: str, words: str) -> None:
 
 
 def test_what_is_wrong_in_a_list_is_told_alone() -> None:
-    """Not that it is too short without it, too."""
+    """The message does not also say that the list is too short."""
     with pytest.raises(CaseError) as refusal:
         parse_case(template("vibration"), "case.yaml", ["forces=[nix]"])
     assert str(refusal.value).startswith("--set forces=[nix]: forces.0: 'nix': not a number with")

@@ -1,4 +1,4 @@
-"""``fretscale describe``: the picture of an assembly and its file for ParaView."""
+"""Tests of ``fretscale describe``: the picture of an assembly and its file for ParaView."""
 
 import json
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("reads_here")
 
 @pytest.fixture
 def file(blocks):
-    """Two blocks with a node at a corner, and the nodes of a face."""
+    """Return two blocks with a node at a corner, and the nodes of a face."""
     path = blocks.with_name("blocks.inp")
     sets = "*Nset, nset=tip\n27\n*Nset, nset=nodes_high, generate\n19, 27, 1\n"
     edit(path, "*End Part\n*Assembly", f"{sets}*End Part\n*Assembly")
@@ -41,7 +41,7 @@ def test_assembly_is_drawn_and_written(file, tmp_path):
 
 
 def test_groups_are_in_the_file_for_paraview(file, tmp_path):
-    """Surfaces of bodies and boundaries, each facet once, and the file's own numbers of nodes."""
+    """It has the surfaces of bodies and boundaries, each facet once, and the node numbers."""
     assert invoke("describe", file, "--out", tmp_path / "drawn").exit_code == 0
     grid = pv.read(tmp_path / "drawn" / "assembly.vtu")
     imported = read_bodies(file)
@@ -85,7 +85,7 @@ def test_picture_tells_faces_and_sizes(file):
 
 
 def test_only_what_is_turned_to_the_eye_is_drawn(file):
-    """Half of a convex body's facets, and none of the other half."""
+    """Half of a convex body's facets are drawn, and none of the other half."""
     (_, base, _) = figure(shown_bodies(read_bodies(file)), "blocks.inp").subfigs
     for axis in base.axes:
         (surface,) = axis.collections
@@ -108,7 +108,7 @@ def test_plane_bodies_are_drawn_to_scale(tmp_path):
 
 
 def test_many_bodies_and_faces_are_counted(tmp_path):
-    """More than can be told apart in a picture are named by the list."""
+    """If there are too many for distinct colours in the picture, a list names them."""
     corners, cells = cae_files.mixed_column()
     cell = cells["hexahedron"][:1]
     count = MOST_BODIES + 3

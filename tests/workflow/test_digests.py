@@ -1,4 +1,4 @@
-"""Files are what was written, and finished runs as they were left: or they are not believed."""
+"""Changed files, and finished runs with changed files, are detected and not used."""
 
 import random
 import shutil
@@ -37,7 +37,7 @@ def test_arrays_come_back(tmp_path):
 
 
 def test_no_bit_can_change(tmp_path):
-    """Not one of numbers, names, attributes or structure, and none of the digest."""
+    """A change in numbers, names, attributes, structure or digest is detected."""
     path, dice = kept(tmp_path / "jump.h5"), random.Random(12)
     whole = path.read_bytes()
     digest, rest = range(8 * 64), range(8 * 512, 8 * len(whole))
@@ -140,7 +140,7 @@ def test_run_with_a_damaged_cache_finds_the_same_and_says_so(start, whole, tmp_p
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """A wear case of loads from a file, and its run; not to be changed."""
+    """Return a wear case of loads from a file, and its run, which tests must not change."""
     root = tmp_path_factory.mktemp("finished")
     (root / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     once = ROLLER_WEAR.replace("  cycles: 4e4", "  cycles: 1e4")
@@ -151,7 +151,7 @@ def finished(tmp_path_factory):
 
 @pytest.fixture
 def left(finished, tmp_path):
-    """A copy of the run, and its case; the file of loads is shared."""
+    """Return a copy of the run and its case; the file of loads is shared."""
     shutil.copytree(finished / "out", tmp_path / "out")
     return tmp_path / "out", load_case(finished / "wear.yaml")
 
@@ -228,7 +228,7 @@ def test_finished_run_of_other_files_is_computed_again(finished, left):
 
 
 def test_finished_run_whose_case_was_changed_is_not_its_run(left, finished):
-    """Nor is the changed case finished."""
+    """The run does not belong to the changed case, and that case is not finished either."""
     out, case = left
     swap(out / "case.yaml", b"coefficient: 0.4 ", b"coefficient: 0.6 ")
     assert kept_in(out, case) == "other"
@@ -250,7 +250,7 @@ def test_case_that_is_no_text_is_of_another_run(left):
 
 
 def test_files_are_found_in_cases_that_cases_name(finished, tmp_path):
-    """So a joint that follows the wear of a contact knows the loads of that."""
+    """A joint that follows the wear of a contact depends on the loads of that contact."""
     wear, loads = finished / "with_loops.yaml", finished / "loads.csv"
     wear.write_text(ROLLER_WEAR + "loops: {amplitude: 1 um}\n", encoding="utf-8")
     invoke("new", "joint", tmp_path / "joint.yaml")

@@ -2,9 +2,9 @@
 
 The run takes its increments in two.
 
-Nothing is shared with the solver: the influence of a strip comes from Johnson's line integrals
-(1985, eqs 2.25), for one elastic half-plane on a rigid body, and the normal and the tangential
-problem are adjusted to each other until neither moves.
+The reference shares nothing with the solver: the influence of a strip comes from Johnson's line
+integrals (1985, eqs 2.25), for one elastic half-plane on a rigid body, and the normal and the
+tangential problem are solved alternately until neither changes.
 """
 
 from itertools import islice
@@ -23,7 +23,7 @@ STRIPS, SIZE = 128, 1.2
 PARTS = 2
 PATH = [(10.0 * k, 0.0) for k in range(1, 41)] + [(400.0, 5.0 * k) for k in range(1, 21)]
 PATH += [(400.0, 100.0 - 5.0 * k) for k in range(1, 41)]
-# Largest change of an adjustment, over the largest pressure.
+# Largest change of an iteration, relative to the largest pressure.
 SETTLED = 1e-8
 
 PITCH = SIZE / STRIPS
@@ -31,7 +31,7 @@ X = (np.arange(STRIPS) - 0.5 * (STRIPS - 1)) * PITCH
 
 
 def influence():
-    """Displacement along a traction, and across it, of unit tractions on the strips [mm/MPa]."""
+    """Return the displacement along and across unit tractions on the strips [mm/MPa]."""
     distance = X[:, None] - X[None, :]
     ends = distance + 0.5 * PITCH, distance - 0.5 * PITCH
     logarithm = np.subtract(*(t * np.log(np.abs(t)) - t for t in ends))
@@ -44,7 +44,7 @@ ALONG, ACROSS = influence()
 
 
 def constrained(cells, right, modes, resultants):
-    """Tractions on ``cells`` that give displacements ``right`` but for rigid ``modes``."""
+    """Return tractions on ``cells`` that give displacements ``right`` up to rigid ``modes``."""
     rows = [mode[cells] for mode in modes]
     count, size = len(rows), int(cells.sum())
     matrix = np.zeros((size + count, size + count))
@@ -58,7 +58,7 @@ def constrained(cells, right, modes, resultants):
 
 
 def press(load, shear, pressed):
-    """Pressure under ``load`` without moment, ``shear`` given."""
+    """Return the pressure under ``load`` without moment, for a given ``shear``."""
     unloaded = X**2 / (2.0 * RADIUS) + ACROSS @ shear
     while True:
         pressure, rigid = constrained(pressed, -unloaded, [np.ones(STRIPS), X], [load, 0.0])
@@ -70,7 +70,7 @@ def press(load, shear, pressed):
 
 
 def drag(force, pressure, offset, sense):
-    """Shear that sums up to ``force``; it slips in ``sense`` where it cannot stick."""
+    """Return shear with the resultant ``force``; it slips in ``sense`` where it cannot stick."""
     stuck = pressure > 0.0
     while True:
         slips = (pressure > 0.0) & ~stuck
@@ -89,7 +89,7 @@ def drag(force, pressure, offset, sense):
 
 
 def march():
-    """Pressure and shear at every increment of ``PATH``."""
+    """Return pressure and shear at every increment of ``PATH``."""
     pressure, shear, sense = np.zeros(STRIPS), np.zeros(STRIPS), np.ones(STRIPS)
     pressed = np.abs(X) < 5.0 * PITCH
     for load, force in PATH:

@@ -1,4 +1,4 @@
-"""Doubts about values that can be but hardly are meant, and the scene as ``check`` tells it."""
+"""Tests of plausibility warnings about unlikely values, and of the scene that ``check`` shows."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def told_of(kind: str, slip: str, folder: Path) -> list[str]:
     return list(doubts_of(load_case(path, [slip, *BESIDE.get(slip, ())])))
 
 
-# What else has to be changed for a case to be valid.
+# Further changes that make a case valid.
 BESIDE = {
     "load_path.stroke=20 mm": ("contact.size=40 mm",),
     "excitation.frequency=100 kHz": ("integration.step=0.1 us",),
@@ -116,7 +116,7 @@ BESIDE = {
 
 @pytest.mark.parametrize(("kind", "slip", "words"), SLIPS, ids=[slip for _, slip, _ in SLIPS])
 def test_a_slip_is_doubted(kind: str, slip: str, words: str, tmp_path: Path) -> None:
-    """By the entry that it is in, on one line."""
+    """The warning names the entry, on one line."""
     told = [doubt for doubt in told_of(kind, slip, tmp_path) if words in doubt]
     assert told, told_of(kind, slip, tmp_path)
     # What two entries say together is told of one of them.
@@ -138,7 +138,7 @@ def test_a_slip_beside_a_mesh_is_doubted(slip: str, words: str, folders: dict[st
 
 
 def test_modes_are_those_of_masses_in_a_row() -> None:
-    """Two of 1 kg on springs of 1 N/um: ω² = (3 ∓ √5)/2 k/m; k/m and 3 k/m with a joint alike."""
+    """Two masses of 1 kg on springs of 1 N/um have ω² = (3 ∓ √5)/2 k/m, or k/m and 3 k/m."""
     rig = Rig(kind="rig", masses=(1e-3, 1e-3), springs=(1e3, 1e3), damping_ratio=0.0)
     opened = np.sqrt(0.5 * (3.0 + np.sqrt(5.0) * np.array([-1.0, 1.0])))
     for held, expected in ((0.0, opened), (1e3, np.sqrt([1.0, 3.0]))):
@@ -147,7 +147,7 @@ def test_modes_are_those_of_masses_in_a_row() -> None:
 
 @pytest.mark.parametrize(("scale", "words"), [(1e3, "are they in µm?"), (1e-3, "are they in m?")])
 def test_heights_in_another_unit_are_doubted(scale: float, words: str, tmp_path: Path) -> None:
-    """A micrometre of roughness, and a paraboloid below it, on a face of a millimetre."""
+    """The heights are 1 µm of roughness, and a paraboloid below it, on a face of 1 mm."""
     x = np.linspace(-0.5, 0.5, 16)
     heights = 1e-3 * np.sin(20.0 * x)[:, None] + np.zeros((16, 16))
     np.save(tmp_path / "gap.npy", heights)
@@ -162,14 +162,14 @@ def test_heights_in_another_unit_are_doubted(scale: float, words: str, tmp_path:
 
 
 def test_all_that_is_usual_is_usual_of_some_entry() -> None:
-    """By its path and its unit: no pattern is misspelt."""
+    """Each pattern matches an entry by path and unit, so none is misspelt."""
     leaves = {(path, unit) for kind in kinds().values() for path, unit in quantities_of(kind)}
     for usual in USUAL:
         assert any(unit == usual.unit and fnmatchcase(path, usual.path) for path, unit in leaves)
 
 
 def quantities_of(model: type[Section], path: str = "") -> Iterator[tuple[str, str | None]]:
-    """Dotted paths of all quantities that a model may have, and their units."""
+    """Yield dotted paths of all quantities that a model may have, and their units."""
     for name, field in model.model_fields.items():
         # A list may be left out: then it is one of several annotations.
         either = (part for part in get_args(field.annotation) if get_origin(part) is Annotated)

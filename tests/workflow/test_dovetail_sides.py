@@ -1,4 +1,4 @@
-"""The sides of a dovetail's sector as a case gives them."""
+"""Tests of the sides of a dovetail's sector as a case gives them."""
 
 import json
 
@@ -23,7 +23,7 @@ COARSE = [
 
 
 def energies(folder, sides, moment):
-    """Energy dissipated in a cycle on both flanks."""
+    """Return the energy dissipated in a cycle on both flanks."""
     changes = [f"structure.sides={sides}", f"load_path.aerodynamic_moment={moment} N*m"]
     out = folder / f"{sides}_{moment}"
     ending = invoke("run", CASES / "dovetail_2d.yaml", "--out", out, *settings(COARSE + changes))
@@ -34,7 +34,7 @@ def energies(folder, sides, moment):
 
 @pytest.mark.slow
 def test_neighbours_change_what_a_moment_does(tmp_path):
-    """More slip on the flank that it presses on, less on the other; alike without one."""
+    """A moment increases slip on the flank that it presses and decreases it on the other."""
     for moment in (0, 30):
         guided, cyclic = (energies(tmp_path, sides, moment) for sides in ("guided", "cyclic"))
         more = [two / one for one, two in zip(guided, cyclic, strict=True)]

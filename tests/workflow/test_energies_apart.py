@@ -1,4 +1,4 @@
-"""Energies of loads that the half-space contradicts: told with both numbers, and only then."""
+"""Tests of warnings that the energies of loads differ from those of the half-space."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +15,7 @@ from workflow.kinds import load_case, parse_case, template
 from workflow.models.structure import StructureLoads
 from workflow.shell.reporter import Reporter
 
-# A cylinder that is sheared to and fro below its limit: ends slip, the middle sticks.
+# A cylinder that is sheared back and forth below its limit: ends slip, the middle sticks.
 ROWS = "P [N/mm],Qx [N/mm],My [N],Edx [N mm/mm]\n1000,300,0,{}\n1000,-300,0,{}\n"
 SETTINGS = [
     *("structure.dimension=2", "structure.size=3", "contact.grid=[64, 8]"),
@@ -41,7 +41,7 @@ def of_file(folder: Path, energy: float):
 
 
 def told(folder, case, source, stage, state, first) -> list[str]:
-    """Warnings about energies."""
+    """Return the warnings about energies."""
 
     class Both:
         interfaces = (state,)
@@ -65,7 +65,7 @@ def test_energies_of_a_file_that_the_half_space_contradicts(tmp_path):
 
 
 def test_energies_that_are_hardly_any_contradict_nothing(tmp_path):
-    """The rest of a table's rounding, where all sticks."""
+    """Rounding of a table causes no warning where everything sticks."""
     case, source, stage, state, first = of_file(tmp_path, 1e-6)
     nothing = replace(first, energy=0.0 * first.energy)
     assert told(tmp_path, case, source, stage, state, nothing) == []
@@ -73,7 +73,7 @@ def test_energies_that_are_hardly_any_contradict_nothing(tmp_path):
 
 @pytest.mark.parametrize(("share", "warned"), [(1.0, False), (0.5, False), (1.7e-4, True)])
 def test_nodes_that_dissipate_what_the_half_space_does_not(tmp_path, share, warned):
-    """Method full wears by the half-space's own energies: 36 of the nodes against 0.006."""
+    """Method full wears by the half-space's energies: 0.006, where the nodes have 36."""
     case = load_case(CASES / "dovetail_2d.yaml", COARSE)
     source = structure_of(case).source(case)
     assert isinstance(source, StructureLoads)

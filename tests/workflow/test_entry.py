@@ -1,4 +1,4 @@
-"""``import fretscale`` in a script, from stdin, in a notebook, and beside files with our names."""
+"""Tests of ``import fretscale`` in scripts, on stdin, in notebooks, and near equal file names."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ FACADE = Path(fretscale.__file__).parents[1]
 
 
 def python(*arguments, cwd, path=(FACADE, ROOT), stdin=None):
-    """A fresh Python in a folder, as a user has it, that looks for modules in ``path`` too."""
+    """Run a fresh Python in a folder, as a user would, with ``path`` added to its module path."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, path))}
     command = [sys.executable, *map(str, arguments)]
     return subprocess.run(
@@ -71,7 +71,7 @@ def test_a_module_that_was_imported_before_is_told(tmp_path):
 
 
 def test_the_packages_may_be_those_of_another_checkout(tmp_path):
-    """As long as they are ours."""
+    """Packages of another checkout are accepted."""
     other = tmp_path / "other"
     other.mkdir()
     for package in ("sa_solver", "wear", "fe_models", "workflow"):
@@ -109,7 +109,7 @@ results = fretscale.run(
 
 @pytest.mark.parametrize("how", ["script", "stdin", "-c"])
 def test_a_program_needs_no_guard(how, tmp_path):
-    """Which multiprocessing asks for; nor is the program run again in a process of ours."""
+    """Unlike multiprocessing, our processes need no guard and do not run the program again."""
     (tmp_path / "script.py").write_text(IN_A_PROCESS, encoding="utf-8")
     arguments = {"script": ["script.py"], "stdin": ["-"], "-c": ["-c", IN_A_PROCESS]}[how]
     ended = python(*arguments, cwd=tmp_path, stdin=IN_A_PROCESS if how == "stdin" else None)
@@ -140,7 +140,7 @@ def test_terminals_without_some_letters_have_them_spelled(encoding, shown):
 
 
 def test_a_program_may_have_no_standard_streams(tmp_path):
-    """Then the processes of a run have none either."""
+    """The processes of the run then have none either."""
     code = "from workflow.shell.streams import hold_standard_streams; hold_standard_streams()"
     code += IN_A_PROCESS.replace('print("once")', "") + "open('done', 'w')"
     python("-c", f"import os; [os.close(i) for i in range(3)]; {code}", cwd=tmp_path)
@@ -148,7 +148,7 @@ def test_a_program_may_have_no_standard_streams(tmp_path):
 
 
 def answer(client, asked):
-    """What a kernel has to say of a cell when it is done."""
+    """Return the messages of a kernel about a cell, once it is done."""
     while True:
         reply = client.get_shell_msg(timeout=PATIENCE)
         if reply["parent_header"]["msg_id"] == asked:

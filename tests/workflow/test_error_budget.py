@@ -1,4 +1,4 @@
-"""The error budget of wear runs: its parts, what is told of them, and how true they are."""
+"""Tests of the error budget of wear runs: its parts, their report, and their accuracy."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def _companions_live(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_smooth_peak_is_all_but_what_it_is_on_cells_of_twice_the_size() -> None:
-    """Hertz's p0 sqrt(1 - (x/a)²): halfway between two cells it falls by h²/8 p'' = 1 / (2 k²)."""
+    """Hertz's p0 sqrt(1 - (x/a)²) falls by h²/8 p'' = 1 / (2 k²) halfway between two cells."""
     across = 41
     x = 2.0 * (np.arange(across) - across // 2) / across
     assert peak_left(np.sqrt(1.0 - x**2)[:, None]) == pytest.approx(1.0 / across**2, rel=0.02)
 
 
 def test_a_peak_without_a_limit_is_told_by_its_cells() -> None:
-    """Means of x^-1/2 over [0, h] and [0, 2h] are as 1 to 1/√2, however small h is."""
+    """Means of x^-1/2 over [0, h] and [0, 2h] have the ratio 1 : 1/√2, however small h is."""
     edges = np.linspace(0.0, 1.0, 65)
     means = np.diff(2.0 * np.sqrt(edges)) / np.diff(edges)
     assert peak_left(means[:, None]) == pytest.approx(1.0 - 1.0 / np.sqrt(2.0), rel=1e-12)
@@ -85,7 +85,7 @@ def test_parts_add_up_and_unknown_ones_are_named() -> None:
 
 
 def test_parts_of_opposite_sign_cancel_but_for_what_each_is_uncertain_by() -> None:
-    """Half of each part, as the parts are drawn at random: the root mean square of many draws."""
+    """Half of each part remains: the root mean square for many random draws of the parts."""
     parts = {"mesh": 0.04, "increments": -0.03, "grid": 0.002}
     error = ResultError(parts, frozenset({"mesh", "increments"}))
     assert error.total == pytest.approx(np.sqrt(0.01**2 + 0.25 * 0.05**2 + 0.002**2), rel=1e-12)
@@ -121,8 +121,10 @@ def companions_of(case) -> Companions:
 
 
 def test_a_peak_changes_by_its_height_and_not_by_where_it_ends() -> None:
-    """A rim that one contact has reached is no change; nor are two peaks that are equal by chance
-    one another's."""
+    """A rim that only one contact has reached is no change of the peak.
+
+    Two peaks that are equal by chance do not belong together either.
+    """
     worn = np.zeros((2, 40, 1))
     worn[:, 10:30] = 80.0
     wider = worn.copy()
@@ -146,7 +148,7 @@ BARE = ("error_budget=known", "output={figures: false, paraview: false, report: 
 
 @pytest.mark.parametrize("step", ["{kind: implicit}", "{kind: second_order}"])
 def test_steps_tell_what_they_leave_of_a_peak(step, tmp_path) -> None:
-    """Automatic ones of either kind on the cylinder: 1.5 and 2.8 %; told were 44 and 27 %."""
+    """Automatic steps of either kind leave 1.5 and 2.8 %; 44 and 27 % were once reported."""
     run = _summary_of(CYLINDER, tmp_path, *BARE, f"wear.step={step}")
     told, peak = (run["interface"][key] for key in ("step_error", "peak_pressure"))
     true = abs(peak["worn"] / CONFORMING - 1.0)
@@ -156,14 +158,14 @@ def test_steps_tell_what_they_leave_of_a_peak(step, tmp_path) -> None:
 
 
 def _advice(warnings: list[str], about: str) -> str:
-    """The setting that a warning names, as ``--set`` takes it."""
+    """Return the setting that a warning names, as ``--set`` takes it."""
     (line,) = (line for line in warnings if about in line)
     key, value = re.search(r"(wear\.[a-z.]+): (\{[^}]*\}|[\d.e+-]+ \S+)[);]*$", line).groups()
     return f"{key}={value}"
 
 
 def test_advice_on_steps_of_given_accuracy_helps(tmp_path) -> None:
-    """What the budget names where steps leave most of a peak makes its error smaller."""
+    """The setting that the budget names for the steps' error of a peak makes it smaller."""
     asked = (*BARE, "wear.step={kind: implicit}", "accuracy=0.2 %")
     first = _summary_of(CYLINDER, tmp_path / "first", *asked)
     advice = _advice(first["warnings"], "mostly by steps")
@@ -184,7 +186,7 @@ BUDGET_KNOWN = ("error_budget=known", "stress.life.parameter=none", "output.repo
 
 @pytest.fixture(scope="module")
 def dovetail(tmp_path_factory):
-    """Depth of a run of the section, and what is advised on each part, by its settings."""
+    """Return the depth of a run of the section and the advice on each part, by its settings."""
     runs: dict[tuple[str, ...], tuple[float, dict[str, str]]] = {}
 
     def worn(*asked: str) -> tuple[float, dict[str, str]]:
@@ -201,7 +203,7 @@ def dovetail(tmp_path_factory):
 
 
 def _taken(advice: str) -> tuple[str, ...]:
-    """Settings that an advice names, as ``--set`` takes them."""
+    """Return the settings that an advice names, as ``--set`` takes them."""
     return tuple(setting.replace(": ", "=", 1) for setting in advice.split(" and "))
 
 
@@ -216,7 +218,7 @@ def _taken(advice: str) -> tuple[str, ...]:
     ],
 )
 def test_advice_on_mesh_and_link_helps(part, own, dovetail) -> None:
-    """Against a mesh so fine that what it leaves does not count, linked to its nodes."""
+    """The reference mesh is so fine that its error is negligible, and linked to its nodes."""
     true, _ = dovetail(*FINE)
     before, advised = dovetail(*COARSE, *own)
     taken = _taken(advised[part])
@@ -236,7 +238,7 @@ def test_advice_on_mesh_and_link_helps(part, own, dovetail) -> None:
     ],
 )
 def test_advice_on_loads_that_follow_helps(own, dovetail) -> None:
-    """Against loads that follow after every jump, of which there are many."""
+    """In the reference, loads follow after every jump, of which there are many."""
     many = "coupling.resultants=every", "wear.step.cycles=20000"
     true, _ = dovetail(*COARSE, *many)
     before, advised = dovetail(*COARSE, *own)
@@ -246,12 +248,12 @@ def test_advice_on_loads_that_follow_helps(own, dovetail) -> None:
     assert abs(after - true) < 0.8 * abs(before - true)
 
 
-# --- lives ----------------------------------------------------------------------------------------
+# --- probe runs -----------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def section():
-    """The section of the default joint on a coarse mesh of first order."""
+    """Return the section of the default joint on a coarse mesh of first order."""
     coarse = "mesh.flank_nodes=[12, 12]", "mesh.size=8 mm", "contact.grid=[64, 64]"
     return load_case(CASES / "dovetail_2d.yaml", [*coarse, "mesh.order=1"])
 
@@ -269,7 +271,7 @@ def test_companions_differ_in_one_thing_each(section) -> None:
 
 
 def test_few_strips_are_compared_with_those_of_a_life(section) -> None:
-    """Second order: 24 strips are off by 64² / (64² - 24²) of what they and 64 are apart."""
+    """At second order, 24 cells are off by 64² / (64² - 24²) of their difference from 64."""
     few = companions_of(changed(section, {"contact.grid": (24, 24)}))
     assert (few.own.contact.grid, few.regridded.contact.grid) == ((64, 24), (24, 24))
     assert few.grid_share == pytest.approx(-1.0 / (1.0 - (24 / 64) ** 2))
@@ -294,7 +296,7 @@ def test_half_spaces_have_a_companion_that_is_linked(section) -> None:
 
 
 def test_a_life_that_fails_leaves_its_own_part_unknown(section, monkeypatch) -> None:
-    """The structure of the finer mesh fails, the others do not."""
+    """The structure of the finer mesh fails, and the other probe runs do not."""
     lived = []
 
     def live(case, source, kind="constant", begun=None):
@@ -327,7 +329,7 @@ def _never(part: str, error: Exception) -> None:
 
 @pytest.mark.slow
 def test_lives_tell_what_loads_that_follow_change(section, monkeypatch) -> None:
-    """Against lives of four times as many steps, with and without."""
+    """The references are probe runs with four times as many steps, with and without updates."""
     companions, source = companions_of(section), structure_of(section).source(section)
     few = replace(companions, finer=None, regridded=None)
     told, rest = few.errors(source, lambda _: source, _never)
@@ -354,7 +356,10 @@ def test_loads_are_those_of_the_last_solution(resultants, shares) -> None:
 
 @pytest.mark.parametrize("rest", [0.5, 1.5, 2.5])
 def test_loads_that_follow_late_are_told_by_a_life(rest) -> None:
-    """Of h' = 1 - z h, whatever the steps; slow ones miss squares of the shares of the cycles."""
+    """The error of h' = 1 - z h is found, whatever the steps.
+
+    Slow changes neglect squares of the shares of the cycles.
+    """
     shares = np.array([0.2, 0.5, 0.3])
     h, three, exact = 0.0, 0.0, (1.0 - np.exp(-rest)) / rest
     for share in shares:
@@ -368,7 +373,7 @@ def test_loads_that_follow_late_are_told_by_a_life(rest) -> None:
 
 @pytest.mark.slow
 def test_lives_tell_what_the_mesh_leaves(section) -> None:
-    """Of two orders and sizes, against a mesh so fine that what it leaves does not count."""
+    """Meshes of two orders and sizes are compared with one of negligible error."""
     structure = structure_of(section)
     companions = companions_of(section)
     told, _ = companions.errors(structure.source(section), structure.source, _never)
@@ -388,7 +393,7 @@ def test_lives_tell_what_the_mesh_leaves(section) -> None:
 
 
 def test_grids_are_compared_by_their_order() -> None:
-    """A body without a structure: the sphere's scar on half as many cells."""
+    """For a body without a structure, the sphere's scar is computed on half as many cells."""
     case = load_case(CASES / "sphere_wear.yaml")
     companions: Companions = companions_of(case)
     coarser = case.contact.grid[0] / companions.own.contact.grid[0]
@@ -402,7 +407,7 @@ def test_grids_are_compared_by_their_order() -> None:
 
 
 def test_wear_that_has_stopped_is_told() -> None:
-    """Both bodies' depth and volume count, and half of the cycles must be behind it."""
+    """Depth and volume of both bodies count, and it must have lasted half of the cycles."""
     cycles = np.array([0.0, 1e3, 1e4, 1e5, 1e6])
 
     def stopped(*depths: float) -> float | None:
@@ -421,7 +426,7 @@ def test_wear_that_has_stopped_is_told() -> None:
 
 @pytest.mark.slow
 def test_a_run_tells_its_errors(tmp_path) -> None:
-    """Against a run finer in everything, the parts add up to the error of depth and volume."""
+    """The parts add up to the difference of depth and volume from a finer run."""
     coarse = "mesh.flank_nodes=[14, 14]", "mesh.size=7 mm", "mesh.order=1", "contact.grid=[64, 64]"
     coarse += ("load_path.increments=[4, 7]",)
     fine = "mesh.flank_nodes=[61, 61]", "mesh.size=2 mm", "mesh.order=2", "contact.grid=[128, 128]"

@@ -1,4 +1,4 @@
-"""Contacts on few cells of their grid: what a run says of them, and which grid it proposes."""
+"""Tests of contacts on few cells of their grid: the warnings and the proposed grids."""
 
 import json
 import re

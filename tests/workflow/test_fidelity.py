@@ -1,4 +1,4 @@
-"""Fidelity by probes: what each axis decides, and that the whole is as accurate as asked for."""
+"""Tests of settings chosen by probe runs: the decision on each axis, and the total accuracy."""
 
 import json
 from pathlib import Path
@@ -47,7 +47,7 @@ def case(plane_path):
 
 
 def read_again(case, folder):
-    """What the case is when it is written and read again."""
+    """Return the case after it has been written and read."""
     path = folder / "case.yaml"
     path.write_text(dump_case(case), encoding="utf-8")
     return load_case(path)
@@ -66,7 +66,7 @@ def both(value):
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 2.0])
 def test_estimate_finds_limit_and_order(order):
-    """f(h) = 1 + 0.3 h^p: errors of all rungs, and of those that were not computed."""
+    """f(h) = 1 + 0.3 h^p gives the errors of all rungs, including those not computed."""
     steps = 0.4, 0.2, 0.1
     estimated = estimate([both(1.0 + 0.3 * h**order) for h in steps], steps, 2.0)
     scale = 1.0 + 0.3 * steps[-1] ** order
@@ -90,7 +90,7 @@ def test_a_flank_that_hardly_wears_is_measured_by_a_share_of_the_other():
 
 
 def test_increments_are_those_of_the_section(case):
-    """Whatever the case has: of legs that are auto it knows none to compare with."""
+    """They do not depend on the case; with automatic legs there are none to compare with."""
     fixed = axes.choose_increments(in_space(case), 0.02)
     auto = axes.choose_increments(changed(case, {"load_path.increments": "auto"}), 0.02)
     assert auto.chosen == fixed.chosen
@@ -99,7 +99,7 @@ def test_increments_are_those_of_the_section(case):
 
 @pytest.mark.slow
 def test_lives_of_increments_are_of_second_order(case):
-    """Doubled once more they change a quarter as much or less."""
+    """Doubling the increments again changes a quarter as much or less."""
     section = plane_section(case)
     legs = [(4 * k, 7 * k) for k in (1, 2, 4, 8)]
     values = [life(changed(section, case.divided(counts))) for counts in legs]
@@ -128,7 +128,7 @@ def test_mesh_is_the_coarsest_within_its_share(case, monkeypatch, allowed, nodes
 
 
 def test_mesh_in_space_is_never_finer_than_written(case, monkeypatch):
-    """But its error is known from finer ones in the plane, and told."""
+    """Its error is still known, from finer meshes in the plane, and reported."""
     monkeypatch.setattr(axes, "life", by_nodes)
     decision = axes.choose_mesh(in_space(case), 0.01)
     assert decision.value == (9, 9)
@@ -159,7 +159,7 @@ def test_grid_in_space_shares_between_its_directions(case, monkeypatch):
 
 
 def test_the_profile_along_the_slot_wears_most_at_its_ends(case):
-    """Strips resolve the peaks at its ends; the volume is α µ Σ P s, slip s being uniform."""
+    """Cells resolve the peaks at its ends; the volume is α µ Σ P s with uniform slip s."""
     section = plane_section(case)
     coarse, fine = (end_life(section, cells)["intrados"] for cells in (64, 256))
     structure = structure_loads(section, dovetail_joint)
@@ -190,7 +190,7 @@ def test_steps_are_automatic_with_their_share_as_tolerance(case, tmp_path):
 @pytest.mark.slow
 @pytest.mark.long
 def test_steps_leave_no_more_than_their_tolerance(plane_path, tmp_path):
-    """Of depth and volume, over a long run of flanks that carry differently."""
+    """Depth and volume keep the tolerance over a long run of flanks that carry differently."""
     uneven = "load_path.aerodynamic_moment=3e4", "friction.coefficient=0.25"
     long = "wear.cycles=1e6", "coupling.resultants=constant"
     case = load_case(plane_path, [*COARSE, *QUIET, *uneven, *long])
@@ -204,7 +204,7 @@ def test_steps_leave_no_more_than_their_tolerance(plane_path, tmp_path):
 
 @pytest.mark.parametrize("tolerance", [1e-3, slow(2e-4)])
 def test_tolerance_leaves_half_of_itself(case, tolerance):
-    """Of depth and volume, on a case where flanks carry differently."""
+    """The error of depth and volume is half of the tolerance if flanks carry differently."""
     case = changed(case, {"load_path.aerodynamic_moment": 3e4, "friction.coefficient": 0.25})
     section = plane_section(case)
     loose, tight = (life(changed(section, {"contact.tolerance": t})) for t in (tolerance, 1e-9))
@@ -216,7 +216,7 @@ def test_tolerance_leaves_half_of_itself(case, tolerance):
 
 @pytest.mark.slow
 def test_drift_is_what_changes_depth_by_its_share(case):
-    """Followed after each of n steps, a steady drift is felt for 1 - 1/n of what it would be."""
+    """With n steps, loads that follow after each feel 1 - 1/n of a steady drift."""
     section = plane_section(case)
     coupled, drift = coupled_life(section)
     apart = life(section)
@@ -239,7 +239,7 @@ def test_constant_resultants_stay_so(case):
 
 @pytest.fixture
 def cheap_probes(monkeypatch):
-    """Lives whose errors are known, instead of computed ones."""
+    """Replace probe runs by ones whose errors are known."""
 
     def known(case):
         mesh, grid = case.mesh.flank_nodes[0], case.contact.grid[0]
@@ -274,13 +274,13 @@ def test_shares_add_up_to_the_accuracy(plane_path):
 
 @pytest.mark.usefixtures("cheap_probes")
 def test_record_makes_the_case(plane_path, tmp_path):
-    """As a resumed run reads it, from JSON, and as the folder's case has it."""
+    """The record gives the case of the folder, also when a resumed run reads it from JSON."""
     case = load_case(plane_path, ["fidelity=auto", *COARSE])
     chosen, record = ANALYSIS.choose(case)
     read = json.loads(json.dumps(record))
     assert dump_case(changed(case, read["chosen"])) == dump_case(chosen)
     assert read_again(chosen, tmp_path) == chosen
-    # What is physics stays as written.
+    # The physical settings stay as written.
     assert chosen.contact.method == case.contact.method
     assert chosen.friction == case.friction
     assert chosen.wear.blade == case.wear.blade
@@ -303,7 +303,7 @@ def test_a_probe_that_fails_leaves_the_setting_and_says_so(plane_path, monkeypat
 
 
 def test_nothing_that_wears_decides_nothing(case):
-    """Without friction no energy is dissipated: every rung is right, and none is chosen."""
+    """Without friction no energy is dissipated, so every rung is exact and none is chosen."""
     section = plane_section(changed(case, {"friction.coefficient": 0.0}))
     with pytest.raises(MethodFailed, match="nothing wears"):
         life(section)
@@ -349,7 +349,7 @@ FEW = 8, 14
 @pytest.mark.long
 @pytest.mark.parametrize("name", PROOFS)
 def test_accuracy_is_met_at_half_the_cost_or_less(name, dovetail_path, tmp_path):
-    """Depth and volume against the finest rung of every axis, that of increments by Richardson.
+    """The finest rung of every axis is the reference; for increments, Richardson's limit.
 
     Convolutions count the cost. Meshes in space are those of the case on all rungs.
     """

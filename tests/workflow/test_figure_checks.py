@@ -1,6 +1,6 @@
-"""Figures of odd runs: nothing cut, covered, empty or mostly white.
+"""Figures of unusual runs: nothing is cut, covered, empty or mostly white.
 
-What is asked of a figure is in ``figure_checks``.
+``figure_checks`` defines the requirements.
 """
 
 from collections.abc import Callable, Iterator
@@ -42,7 +42,7 @@ def style() -> Iterator[None]:
 
 
 def wrong(figure: Figure) -> list[str]:
-    """What is wrong with a figure when it is drawn as the writer does."""
+    """Return the problems of a figure that is drawn as by the writer."""
     figure.set_dpi(DOTS_PER_INCH)
     figure.draw_without_rendering()
     return problems(figure)
@@ -55,7 +55,7 @@ def scene(
     names: tuple[str, ...],
     shape: tuple[int, int],
 ) -> tuple[Path, Contents]:
-    """Synthetic results of so many faces of a size, with their contents."""
+    """Return synthetic results of some faces of a given size, with their contents."""
     loads = {name: 1.0 - 0.05 * number for number, name in enumerate(names)}
     monkeypatch.setattr(conftest, "SIZE", size)
     monkeypatch.setattr(conftest, "INTERFACES", loads)
@@ -65,7 +65,7 @@ def scene(
 
 
 def many(path: Path, shape: tuple[int, int]) -> Path:
-    """Results of one interface or many: the parts that ``FIGURES`` need."""
+    """Return results of one interface or many, with the parts that ``FIGURES`` need."""
     grid = Grid.covering((1.08 * conftest.SIZE[0], 1.05 * conftest.SIZE[1]), shape)
     with h5py.File(path, "w") as file:
         file.attrs.update(friction=conftest.FRICTION, peak_increment=conftest.PEAK)
@@ -112,7 +112,7 @@ def change_results(path: Path, how: Callable[[h5py.File], Any]) -> Path:
 
 
 def keep_middle(file: h5py.File) -> None:
-    """Contacts that fill 2 % of their grids."""
+    """Reduce contacts to 2 % of their grids."""
     for contact in file["contact"].values():
         for jump in conftest.CONTENTS.jump_names:
             field = contact[jump]["pressure"]

@@ -1,4 +1,4 @@
-"""Figures: all there, legible in size, not blank, and true to the data where they show numbers."""
+"""Figures are complete, legible, not blank, and show numbers from the data."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,7 @@ def written(results: Path) -> list[Path]:
 
 @pytest.fixture
 def changed(results: Path, tmp_path: Path) -> Path:
-    """A copy to take things out of."""
+    """Return a copy of the results, from which tests may remove parts."""
     copy = tmp_path / "results.h5"
     copy.write_bytes(results.read_bytes())
     return copy

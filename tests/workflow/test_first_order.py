@@ -1,4 +1,4 @@
-"""Bands of a sweep to first order: exact of what is linear, and told where it is not."""
+"""Tests of first-order bands of a sweep: exact if linear, otherwise with a reported error."""
 
 import json
 
@@ -22,7 +22,7 @@ NORMAL = 1.959963984540054
 
 
 def sample_of(deviations, correlation=None):
-    """Parameters of means 1, 2, 3, ... and relative ``deviations``."""
+    """Return parameters of means 1, 2, 3, ... and relative ``deviations``."""
     told = [
         parameter(f"p{mean}", mean, (mean * (1 - NORMAL * d), mean * (1 + NORMAL * d)))
         for mean, d in enumerate(deviations, 1)
@@ -31,7 +31,7 @@ def sample_of(deviations, correlation=None):
 
 
 def test_what_is_linear_has_g_c_gt():
-    """Of three tied parameters; and Archard's volume k P s/H, of k alone."""
+    """Linear results of three tied parameters, and Archard's volume k P s/H, have g C gᵀ."""
     tied = np.array([[1.0, 0.5, -0.7], [0.5, 1.0, 0.0], [-0.7, 0.0, 1.0]])
     sample = sample_of((0.1, 0.3, 0.2), tied)
     slope, deviations = np.array([2.0, -1.0, 4.0]), np.array([0.1, 0.6, 0.6])
@@ -58,7 +58,7 @@ def test_what_is_linear_has_g_c_gt():
     ],
 )
 def test_what_is_not_linear_is_told(law, correlation, deviation):
-    """Sides are as far off those of 65 536 draws as told, but for a third; or there is no band."""
+    """Reported errors match 65 536 draws within a third, or there is no band."""
     sample = sample_of((deviation,) * 2, np.array([[1.0, correlation], [correlation, 1.0]]))
     found = first_order(law(sample.draw(positions(2))))
     draws = law(sample.draw(ndtri(Sobol(2, rng=0).random_base2(16))))
@@ -81,7 +81,7 @@ def load(folder, text):
 
 
 def test_the_runs_are_the_best_values_and_pairs_beside_them(tmp_path):
-    """Of a fit, whose parameters go together, and of a distribution beside it."""
+    """The parameters are correlated ones of a fit and an independent one."""
     young = "materials.body_1.young"
     vary = f"vary: {{{young}: {{distribution: {{kind: lognormal, median: 100 GPa, factor: 2}}}}}}"
     runs = runs_of(load(tmp_path, f"fit: fit.json\n{vary}\n"))
@@ -117,7 +117,7 @@ def test_what_has_no_first_order_is_refused(tmp_path, text, words):
 
 @pytest.mark.slow
 def test_a_worn_volume_has_the_band_of_its_coefficient(tmp_path):
-    """V = k P s/H, of three runs of a cylinder that slides; its depth is nearly linear."""
+    """Three runs of a sliding cylinder give V = k P s/H; its depth is nearly linear."""
     case = YAML(typ="safe").load((CASES / "cylinder_wear.yaml").read_text("utf-8"))
     bodies = {f"body_{n}": {"coefficient": 10.0 ** (-3 - n), "hardness": 3500} for n in (1, 2)}
     case |= {"wear": {"law": "archard", "cycles": 4000, **bodies}, "expect": []}

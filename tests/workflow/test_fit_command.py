@@ -1,4 +1,4 @@
-"""``fretscale fit``: tables in, a section of a case out, nonsense in one line."""
+"""Tests of ``fretscale fit``: tables become a section of a case; wrong input gives one line."""
 
 import json
 
@@ -38,7 +38,7 @@ VOLUMES = "energy [J], volume [mm^3]\n500, 3.2e-3\n2900, 7.3e-3\n4000, 8.5e-3\n7
 
 
 def loops_csv():
-    """The three functions of Fantetti et al. 2019, table 4.2, as loops have them."""
+    """Write the three functions of Fantetti et al. 2019, table 4.2, as loops have them."""
     energy = np.concatenate([[0.0], np.geomspace(0.1, 2800.0, 25)])
     with np.errstate(divide="ignore"):
         kt = 27.3 * (1.0 + 1.32 * np.exp(-150.0 / energy))
@@ -86,7 +86,7 @@ def test_printed_parameters_come_back_as_a_section_to_paste(folder):
 
 
 def test_friction_is_of_loops_that_slide(folder):
-    """Computed loops say so: of one that sticks, force over load is less than the coefficient."""
+    """In a loop that sticks, force over load is less than the coefficient of friction."""
     slides = ["sliding", *("1" if k != 5 else "0.3" for k in range(26))]
     lines = [f"{a}, {b}" for a, b in zip(loops_csv().splitlines(), slides, strict=True)]
     energy, mu, rest = lines[6].split(", ", 2)
@@ -104,7 +104,7 @@ def test_friction_is_of_loops_that_slide(folder):
 
 
 def leaves(node, path=""):
-    """Numbers of a section by path."""
+    """Return the numbers of a section by path."""
     if isinstance(node, dict):
         found = [leaves(value, f"{path}.{key}") for key, value in node.items()]
         return {name: number for part in found for name, number in part.items()}
@@ -130,7 +130,7 @@ def test_volumes_of_two_bodies_have_coefficients_of_their_own(folder):
 
 
 def test_what_is_not_determined_stands_without_a_number(folder):
-    """No loop of the unworn joint: the three parameters of the logarithm are two."""
+    """Without loops of the unworn joint, two of three parameters of the logarithm are found."""
     text = "".join(line for line in loops_csv().splitlines(True) if not line.startswith("0,"))
     (folder / "loops.csv").write_text(text, encoding="utf-8")
     found = fretscale.fit(folder / "joint.yaml")

@@ -1,4 +1,4 @@
-"""``fretscale fit`` of profiles: runs until they are enough, of closed forms and of a case."""
+"""Tests of ``fretscale fit`` for profiles, with closed forms and with runs of a case."""
 
 from pathlib import Path
 
@@ -42,12 +42,12 @@ RADIUS, CUBE = 10.0, 0.5**3 / 1e-8
 
 
 def cylinder(total, x):
-    """Depth of both bodies [mm]: b³ goes with the coefficient, and what is lost is b² - x² / 2R."""
+    """Return the depth of both bodies [mm]: b³ ~ coefficient, and the loss is b² - x² / 2R."""
     return np.maximum((CUBE * total) ** (2.0 / 3.0) - x**2, 0.0) / (2.0 * RADIUS)
 
 
 def write_scan(path, columns, raised=5e-4, tilted=3e-4):
-    """A scan that scatters, raised and tilted."""
+    """Write a scan with scatter, an offset and a tilt."""
     rng = np.random.default_rng(7)
     noise = [raised + tilted * PLACES + SCATTER * rng.standard_normal(120) for _ in columns]
     heights = [1e3 * (depth + off) for depth, off in zip(columns, noise, strict=True)]
@@ -65,7 +65,7 @@ def folder(tmp_path):
 
 
 class ClosedForms(TestRuns):
-    """Runs that are closed forms; finer ones are 3 % deeper."""
+    """Replacement of runs by closed forms; finer ones are 3 % deeper."""
 
     def scars(self, wanted, finer=None, alike=True):
         assert alike
@@ -79,10 +79,10 @@ class ClosedForms(TestRuns):
 
 
 def test_coefficients_of_both_bodies_come_back_through_closed_forms(folder, monkeypatch):
-    """The case begins with others; what finer runs change is told, here far too much.
+    """The case starts with other coefficients; the large change by finer runs is reported.
 
-    Of scars 3 % deeper α is 3 % too large but for what height and width have of it: the mean of
-    b² - x² is 2/3 b², and so is its derivative by ln α.
+    Scars that are 3 % deeper give α 3 % too large, except for the influence of height and width:
+    the mean of b² - x² is 2/3 b², and so is its derivative by ln α.
     """
     monkeypatch.setattr(profiles, "TestRuns", ClosedForms)
     whole = cylinder(9e-9, PLACES)
@@ -139,7 +139,7 @@ def test_its_runs_need_a_folder(folder):
 
 @pytest.mark.slow
 def test_a_coefficient_comes_back_through_runs_which_are_taken_up(folder):
-    """A scar of other steps and another grid; a second call makes no run anew."""
+    """The scar has other steps and another grid; a second call repeats no run."""
     case = fretscale.load_case(
         folder / "test.yaml",
         wear__body_1__coefficient="5e3 um^3/J",

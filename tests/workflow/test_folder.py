@@ -1,4 +1,4 @@
-"""The output folder: whose it is, and what is refused."""
+"""Tests of the output folder: its owner, and refusals."""
 
 import json
 
@@ -25,7 +25,7 @@ def files(folder):
 
 
 def make(folder, *names):
-    """Entries as a run makes them."""
+    """Make entries as a run does."""
     for name in names:
         folder.reserve(name, "a test").write_text("old")
 
@@ -79,7 +79,7 @@ def test_own_files_in_the_folders_of_a_run_stay(case, folder, force):
 
 
 def test_what_links_lead_to_stays(case, folder, tmp_path):
-    """A file, a folder with what would be of a run, and partial files, all outside."""
+    """Links lead to a file, a folder that looks like a run's, and partial files, all outside."""
     folder.claim(case, force=False, resumable=True)
     with folder.filling("figures", "a test") as figures:
         (figures / "loops.png").write_text("old")
@@ -205,7 +205,7 @@ OLDER = ["case.yaml", "results.h5", "summary.json", "worn.msh"]
     ],
 )
 def test_what_is_refused_and_what_force_takes(case, folder, prepare, words, stays, aside):
-    """Without a manifest nothing is removed: what is in the way is set aside."""
+    """Without a manifest nothing is removed: files in the way are renamed."""
     prepare(folder, case)
     before = files(folder)
     with pytest.raises(UserError, match=words) as refusal:
@@ -227,7 +227,7 @@ def test_finished_run_of_the_same_case_may_be_repeated(case, folder):
 
 @pytest.mark.parametrize("finished", [False, True])
 def test_a_run_of_its_own_stays_until_the_case_is_finished(case, folder, finished):
-    """Such as the wear of a joint, which takes longest."""
+    """An example is the wear of a joint, which takes longest."""
     folder.claim(case, force=False, resumable=False)
     nested = OutputFolder(folder.reserve("wear", "a test"))
     nested.claim(case, force=False, resumable=True)

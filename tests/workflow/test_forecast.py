@@ -1,4 +1,4 @@
-"""How long a run will take: told after its first steps, and by a check before it begins."""
+"""Tests of run-time forecasts: after the first steps of a run, and by a check before it."""
 
 import json
 import re
@@ -22,7 +22,7 @@ CASES = Path("cases")
 
 
 class Clock:
-    """Tells the time that a test sets."""
+    """Clock whose time the test sets."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -50,7 +50,7 @@ def test_what_is_left_takes_what_its_share_tells(clock: Clock) -> None:
 
 
 def test_what_an_earlier_run_left_tells_nothing_of_the_rest(clock: Clock) -> None:
-    """Three quarters at once, then a tenth in 10 s: the last 15 % take 15 s."""
+    """After three quarters at once and a tenth in 10 s, the last 15 % take 15 s."""
     forecast = Forecast()
     forecast.reach(0.75)
     forecast.go_on()
@@ -80,7 +80,7 @@ def test_times_are_told_as_roughly_as_they_are_known(seconds: float, told: str) 
 
 
 def test_a_forecast_is_told_once_and_again_where_it_changes(clock: Clock, tmp_path: Path) -> None:
-    """Ten steps of 60 s, of which the seventh takes ten times as long; the first does not count."""
+    """Of ten steps of 60 s the seventh takes ten times as long; the first does not count."""
     reporter = Reporter(tmp_path / "log", expected=RunTime(after=30.0))
     with reporter.course("wear"):
         for step in range(1, 11):
@@ -118,7 +118,7 @@ def test_a_first_step_may_be_loading(clock: Clock, tmp_path: Path) -> None:
 def test_of_little_work_it_is_told_what_was_expected(
     clock: Clock, tmp_path: Path, rate: float, told: str
 ) -> None:
-    """200 s expected: 2e-5 of the work in 2 s tells nothing (28 h), a tenth (20 s) a good deal."""
+    """200 s are expected: 2e-5 of the work in 2 s (28 h) counts little, a tenth in 20 s a lot."""
     reporter = Reporter(tmp_path / "log", expected=RunTime(course=200.0, after=0.0))
     with reporter.course("motions"):
         for step in (1, 2, 3):
@@ -129,7 +129,7 @@ def test_of_little_work_it_is_told_what_was_expected(
 
 
 def test_what_comes_after_is_as_slow_as_what_came_before(clock: Clock, tmp_path: Path) -> None:
-    """40 s in place of 7 + 3 until the long part: 20 s more of it and 80 of pictures, not 20."""
+    """The start takes 40 s instead of 7 + 3 s, so the end takes 20 + 80 s, not 20 s."""
     reporter = Reporter(tmp_path / "log", expected=RunTime(before=7.0, after=20.0))
     clock.now += 40.0
     with reporter.course("wear"):
@@ -140,7 +140,7 @@ def test_what_comes_after_is_as_slow_as_what_came_before(clock: Clock, tmp_path:
 
 
 def test_parts_share_the_work_of_what_is_around_them(clock: Clock, tmp_path: Path) -> None:
-    """Two forces of two parts, whose first halves are told: from 1/8 to 5/8 in 100 s."""
+    """The first halves of two forces with two parts advance from 1/8 to 5/8 in 100 s."""
     reporter = Reporter(tmp_path / "log")
     with reporter.course("curves"):
         for force in reporter.parts((10.0, 30.0), "{:g} N".format):
@@ -156,7 +156,7 @@ def test_parts_share_the_work_of_what_is_around_them(clock: Clock, tmp_path: Pat
 
 @pytest.fixture
 def every_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forecasts of runs however short, from their first step on."""
+    """Make forecasts for runs of any length, from their first step on."""
     for least in ("FIRST_WORK", "FIRST_STEP", "SHORT_RUN"):
         monkeypatch.setattr(f"workflow.shell.reporter.{least}", 0.0)
 
@@ -213,7 +213,7 @@ def test_runs_of_every_kind_tell_how_far_they_are(
     ],
 )
 def test_check_tells_the_order_of_magnitude(name: str, true: float) -> None:
-    """Against processor seconds of the shipped cases on one core, structures not in the cache."""
+    """The reference is processor seconds of shipped cases on one core, with an empty cache."""
     case = load_case(CASES / f"{name}.yaml")
     told = analysis_of(case).run_time(case).seconds
     assert true / 5.0 < told < 5.0 * true
@@ -249,7 +249,7 @@ def steps_expected(case: Any) -> Steps:
 
 @pytest.mark.parametrize(("cycles", "tolerance"), [(1e5, "1 %"), (1e5, "0.1 %"), (1e7, "1 %")])
 def test_jumps_on_given_slips_are_counted(cycles: float, tolerance: str, tmp_path: Path) -> None:
-    """Automatic ones of the sliding cylinder, as many as its run makes within a factor of three."""
+    """The estimated number of automatic jumps is within a factor of three of the run's."""
     path, out = CASES / "cylinder_wear.yaml", tmp_path / "out"
     changes = ["wear.step={kind: implicit}", f"wear.cycles={cycles}", f"wear.tolerance={tolerance}"]
     expected = steps_expected(load_case(path, changes))
@@ -284,7 +284,7 @@ def test_jumps_that_settings_tell_are_counted(settings: list[str], jumps: int) -
     ],
 )
 def test_jumps_that_nobody_can_count_are_said_to_be_unknown(name: str, settings: list[str]) -> None:
-    """The time is that of a number of jumps, which is told with it."""
+    """The time is given for a certain number of jumps, which is reported with it."""
     path = CASES / f"{name}.yaml"
     case = load_case(path, settings)
     expected = steps_expected(case)

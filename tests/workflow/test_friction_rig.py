@@ -1,4 +1,4 @@
-"""The friction rig with its specimens, from the command line, on pads of a few nodes."""
+"""Tests of the friction rig with its specimens, from the command line, on coarse pads."""
 
 import h5py
 import numpy as np
@@ -93,7 +93,7 @@ def test_the_rig_sticks_under_a_small_force_and_slides_under_a_large_one(files):
 
 @pytest.mark.slow
 def test_pads_pressed_evenly_are_closed_evenly_if_contacts_share_by_area(files):
-    """Contacts so soft that bodies are rigid and flat beside them: each carries its share."""
+    """Contacts are so soft that bodies are rigid in comparison, so each carries its share."""
     law = "law: friction_contact, normal_load: 60, friction: 1"
     soft = f"joint={{{law}, stiffness: 10, normal_stiffness: 10}}"
     shares = {}

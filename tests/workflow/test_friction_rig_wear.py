@@ -1,4 +1,4 @@
-"""Specimens that wear each other in a vibrating rig: balances, limits, rates, and a whole run."""
+"""Tests of specimens that wear in a vibrating rig: balances, limits, rates, and a run."""
 
 import csv
 import json
@@ -50,7 +50,7 @@ ROUNDING = 1e-12
 
 
 def case_in(folder):
-    """The case as it is read from a file; its specimens are in the folder."""
+    """Return the case as read from a file; its specimens are in the folder."""
     (folder / "specimens.yaml").write_text(SPECIMENS, encoding="utf-8")
     given = yaml.safe_load(RIG) | WORN
     # The numbers of cycles below lie between those after which a further node of such pads touches.
@@ -61,7 +61,7 @@ def case_in(folder):
 
 @pytest.fixture(scope="module")
 def pads(tmp_path_factory):
-    """The unworn pads under 75 N at 100 Hz, which makes all of them slide."""
+    """Return the unworn pads under 75 N at 100 Hz, which makes all of them slide."""
     folder = tmp_path_factory.mktemp("pads")
     reporter = Reporter(folder / "log")
     unworn = VibrationModel.of(case_in(folder).unworn, reporter)
@@ -70,12 +70,12 @@ def pads(tmp_path_factory):
 
 
 def with_laws(pads, *laws, force=75.0):
-    """The same pads with laws of their own."""
+    """Return the same pads with other laws."""
     return WearingPads(pads.unworn, laws or LAWS, force, 100.0)
 
 
 def worn(pads, state, cycles, tolerance):
-    """So many cycles more, in steps by the tolerance."""
+    """Wear the pads by further cycles, in steps chosen by the tolerance."""
     return advance_cycles(HeunStepper(tolerance), state, cycles, cycles, pads.contact_at)
 
 
@@ -86,7 +86,7 @@ def unworn(pads):
 
 @pytest.fixture(scope="module")
 def flat(pads, unworn):
-    """Pads that have worn flat."""
+    """Return pads that have worn flat."""
     return worn(pads, unworn, FLAT, 0.1).state
 
 
@@ -102,7 +102,7 @@ def test_the_volume_is_that_of_the_dissipated_energy(pads, flat):
 
 
 def test_energy_is_that_of_the_motions_on_the_way(pads, unworn):
-    """Simpson's rule over energies of a cycle, at the ends of stretches of many steps each."""
+    """Simpson's rule over the energies of cycles gives the sum over many steps."""
     cycles, state = np.linspace(0.0, 1e5, 5), unworn
     energies = [float(pads.at(unworn).energy.sum())]
     for stretch in np.diff(cycles):
@@ -113,7 +113,7 @@ def test_energy_is_that_of_the_motions_on_the_way(pads, unworn):
 
 
 def test_what_a_node_dissipates_is_its_force_along_its_path(pads, unworn):
-    """µ ∮ N |ds|: N hardly changes in the cycle, but at two sides of a pad that rocks a little."""
+    """It is µ ∮ N |ds|; N hardly changes, except at two sides of a pad that rocks a little."""
     cycle = pads.at(unworn)
     pressed = cycle.motion.cycle.samples[:, :, 2].mean(axis=0)
     np.testing.assert_allclose(FRICTION * pressed * cycle.path, cycle.energy, rtol=1e-4, atol=1e-15)
@@ -152,7 +152,7 @@ resolution: {harmonics: 1, samples: 32}
 
 
 def reordered(pads, order):
-    """The same pads with the rows of the rig in another order, its matrices symmetric to a bit."""
+    """Return the same pads with the rows of the rig reordered and its matrices symmetric."""
     rig, problem = pads.unworn.rig, pads.unworn.problem
     mass, stiffness = (
         0.5 * (matrix + matrix.T)[np.ix_(order, order)]
@@ -176,10 +176,10 @@ def reordered(pads, order):
 
 
 def test_the_rig_as_own_matrices_wears_as_the_one_built_in(pads, tmp_path):
-    """Specimens and masses exported, gaps and areas in a table whose rows are in another order.
+    """Specimens and masses are exported; gaps and areas are in a table with reordered rows.
 
-    Modes are behind the other unknowns there. The square of the fastest frequency being 2e11 times
-    that of the first, the last bits of a matrix, or its order, change wear by 2e-6.
+    The modes come after the other unknowns there. As the square of the fastest frequency is 2e11
+    times that of the first, the last bits of a matrix, or its order, change wear by 2e-6.
     """
     rig = pads.unworn.rig
     modal = [f"{name} modal" if " mode " in name else name for name in rig.model.names]
@@ -209,14 +209,14 @@ def test_the_rig_as_own_matrices_wears_as_the_one_built_in(pads, tmp_path):
 
 
 def rates(pads, state, *laws):
-    """Depths of both bodies per cycle, and pressure and path of that cycle."""
+    """Return the depths of both bodies per cycle, and the pressure and path of that cycle."""
     cycle = pads.at(state)
     wear = with_laws(pads, *laws).contact_at(state).wear(state)
     return np.array(wear), cycle.energy / cycle.areas, cycle.path
 
 
 def test_every_law_takes_off_what_it_says(pads, unworn):
-    """Energy, amplitude (a quarter of the path) and Archard, each worked out by hand."""
+    """Energy, amplitude (a quarter of the path) and Archard laws match hand calculations."""
     energy, amplitude = EnergyLaw(1e-9), EnergyAmplitudeLaw(2e-9, 5e-3)
     wear, dissipated, path = rates(pads, unworn, energy, amplitude)
     np.testing.assert_allclose(wear[0], 1e-9 * dissipated, rtol=ROUNDING)
@@ -229,7 +229,7 @@ def test_every_law_takes_off_what_it_says(pads, unworn):
 
 
 def test_nothing_is_lost_below_a_threshold(pads, unworn):
-    """V = α (ΣEd - Ed_th), whatever the steps; energies go on."""
+    """V = α (ΣEd - Ed_th) holds for any steps, and energies keep adding up."""
     cycles = 2e4
     threshold = 0.5 * cycles * float(pads.at(unworn).energy.sum())
     law = EvolvingLaw(EnergyLaw(3e-9), EnergyTable(threshold=threshold), "global")
@@ -261,7 +261,7 @@ def test_gaps_grow_only_where_energy_is_dissipated(pads, unworn):
 
 
 def test_flat_pads_wear_evenly_and_stick_as_pads_without_form(pads, unworn, flat):
-    """In the end depths grow alike: e/A is even; all nodes touch, as those of flat pads do."""
+    """In the end depths grow equally: e/A is uniform, and all nodes touch as in flat pads."""
     cycle, begun = pads.at(flat), pads.at(unworn)
     rate, first = (sum(pads.contact_at(state).wear(state)) for state in (flat, unworn))
     np.testing.assert_allclose(rate, rate.mean(), rtol=5e-3)
@@ -280,7 +280,7 @@ def test_flat_pads_wear_evenly_and_stick_as_pads_without_form(pads, unworn, flat
 
 
 def in_steps(pads, state, cycles, count):
-    """So many steps of Heun's method of one length, whatever their error."""
+    """Take ``count`` equal steps of Heun's method, whatever their error."""
     stepper = HeunStepper(tolerance=np.inf, share=np.inf)
     for _ in range(count):
         state = stepper.step(state, cycles / count, cycles, pads.contact_at).state
@@ -288,7 +288,7 @@ def in_steps(pads, state, cycles, count):
 
 
 def test_steps_converge_with_their_square(pads, unworn):
-    """Over cycles in which no further node comes to touch: there the rate has a corner."""
+    """No further node comes into contact during the cycles, where the rate would have a kink."""
     depths = [in_steps(pads, unworn, 4e4, count).surfaces.depth for count in (1, 2, 8)]
     errors = [np.abs(depth - depths[-1]).max() for depth in depths[:-1]]
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
@@ -310,7 +310,7 @@ def test_the_tolerance_bounds_the_error(pads, unworn):
 
 @pytest.mark.slow
 def test_explicit_steps_come_to_the_same(pads, unworn):
-    """Euler's, of a tenth of their limit: of first order only."""
+    """Euler's steps of a tenth of their limit are of first order only."""
     done = advance_cycles(ExplicitStepper(0.1), unworn, 1e5, 1e5, pads.contact_at)
     best = worn(pads, unworn, 1e5, 0.02).state.surfaces.depth
     error = np.linalg.norm(done.state.surfaces.depth - best) / np.linalg.norm(best)
@@ -319,7 +319,7 @@ def test_explicit_steps_come_to_the_same(pads, unworn):
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_half_the_limit_presses_roughness_away(pads, flat, seed):
-    """In the norm of depths over D, in which D K is symmetric; all paths being alike, D ~ 1/A."""
+    """The norm is of depths over D, in which D K is symmetric; for equal paths D ~ 1/A."""
     rough = 1e-6 * np.random.default_rng(seed).standard_normal(NODES)
     area, length = pads.at(flat).areas, 0.5 * pads.contact_at(flat).stable_cycles(flat)
     rough -= (area @ rough) / area.sum()
@@ -350,7 +350,7 @@ def summary(ended):
 
 
 def stuck_slope(ended):
-    """Largest slope of the unworn loop, between neighbouring samples of which both have stuck."""
+    """Return the largest slope of the unworn loop between neighbouring stuck samples."""
     with h5py.File(ended.results) as file:
         loop = file["worn/00000/loop"]
         moved, pulled = (np.diff(loop[name][()]) for name in ("displacement", "force"))
@@ -437,7 +437,7 @@ def test_figures_are_drawn(ended, tmp_path):
 
 @pytest.fixture
 def text(tmp_path):
-    """The case as a file, beside its specimens."""
+    """Return the case as a file in the folder of its specimens."""
     (tmp_path / "specimens.yaml").write_text(SPECIMENS, encoding="utf-8")
     return RIG + "wear: {force: 75 N, frequency: 100 Hz, cycles: [10]}\n"
 

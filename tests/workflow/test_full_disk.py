@@ -1,4 +1,4 @@
-"""A disk that is full, and output that nobody reads: one line, exit code 3, and on it goes."""
+"""On a full disk or a closed output, a run ends with one line and exit code 3, and can resume."""
 
 import errno
 import os
@@ -33,7 +33,7 @@ linux_only = pytest.mark.skipif(not FULL.exists(), reason="a device of Linux")
 
 
 def command(*arguments, code=COMMAND, **streams):
-    """``fretscale`` as a process."""
+    """Start ``fretscale`` as a process."""
     settings = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | streams
     full = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.run(full, check=False, timeout=PATIENCE, **settings)
@@ -52,7 +52,7 @@ def ball(tmp_path):
 
 @pytest.fixture
 def synced(monkeypatch):
-    """Files in the order in which they were brought to the disk, and renamed."""
+    """Record the order in which files are flushed to disk and renamed."""
     told = []
     fsync, rename = os.fsync, Path.replace
 
@@ -83,7 +83,7 @@ def test_files_are_on_the_disk_before_they_have_their_name(synced, tmp_path):
 
 
 class Full:
-    """A file on a disk that has room for so many bytes; ``short`` writes come before the error."""
+    """File on a disk with limited room; ``short`` writes come before the error."""
 
     def __init__(self, file, room):
         self._file, self._room = file, room
@@ -132,7 +132,7 @@ def test_an_error_of_whoever_writes_is_told_as_it_is(tmp_path):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """A run to its end, and how many files it brought to the disk."""
+    """Return a complete run, and the number of files it flushed to disk."""
     folder, written, fsync = tmp_path_factory.mktemp("whole"), [], os.fsync
     (folder / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     twice = ROLLER_WEAR.replace("  cycles: 4e4", "  cycles: 2e4")
@@ -154,7 +154,7 @@ def same(folder, other):
     "share", [*np.linspace(0.0, 0.75, 4), *map(slow, np.linspace(0.125, 0.875, 4))]
 )
 def test_a_run_goes_on_from_any_file_that_was_not_written(share, whole, monkeypatch, tmp_path):
-    """From some file on nothing can be written any more; what was whole before stays so."""
+    """From some file on nothing can be written; files completed before remain complete."""
     (folder, count), out, fsync = whole, tmp_path / "out", os.fsync
     case, left = load_case(folder / "wear.yaml"), [None] * int(share * count)
 
@@ -180,7 +180,7 @@ def test_a_run_goes_on_from_any_file_that_was_not_written(share, whole, monkeypa
 @posix_only
 @pytest.mark.parametrize("size", [slow(0), 4_000])
 def test_a_limit_of_the_system_ends_a_run_in_one_line(size, ball, tmp_path):
-    """Neither the lock, at first, nor then the results may grow beyond it."""
+    """First the lock, then the results cannot grow beyond the limit."""
     out = tmp_path / "out"
     ending = command("run", ball, "--out", out, code=LIMITED.format(size))
     assert ending.returncode == 3, ending.stderr
@@ -217,7 +217,7 @@ def test_nothing_is_said_where_nothing_can_be(ball, tmp_path):
 @posix_only
 @pytest.mark.parametrize("arguments", [["schema"], slow(["--help"])])
 def test_who_stops_reading_has_had_enough(arguments):
-    """As `head` does: nothing is wrong that anybody has to be told."""
+    """A reader such as `head` may close the output without an error message."""
     read, write = os.pipe()
     os.close(read)
     ending = command(*arguments, stdout=write)

@@ -1,4 +1,4 @@
-"""Mutants of all cases and templates: whatever a case says, ``check`` answers in time and in place.
+"""``check`` answers every mutant of the cases and templates, in time and with a place.
 
 The numbers of the mutants are their seeds: ``Mutants(sources())[number]`` makes one again.
 """
@@ -40,7 +40,7 @@ posix_only = pytest.mark.skipif(sys.platform == "win32", reason="has no alarm")
 
 @pytest.fixture(scope="module")
 def folder(template_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the files that cases and templates name."""
+    """Return a folder with the files that cases and templates name."""
     place = tmp_path_factory.mktemp("mutants")
     for path in [*template_files.iterdir(), *CASES.glob("*.yaml")]:
         shutil.copy(path, place)
@@ -53,13 +53,13 @@ def mutants() -> Mutants:
 
 
 def checked(mutant: Mutant, path: Path) -> Any:
-    """How ``check`` ends; anything but an exit is raised."""
+    """Return how ``check`` ends; any exception except an exit is raised."""
     path.write_bytes(mutant.text)
     return command("check", path, overrides=mutant.overrides)
 
 
 def faults(mutant: Mutant, path: Path) -> Iterator[str]:
-    """What is wrong with how a mutant is taken."""
+    """Yield what is wrong with the answer to a mutant."""
     ended = checked(mutant, path)
     if ended.exit_code == 0:
         yield from _of_an_accepted_one(mutant, path, ended.stdout)
@@ -73,7 +73,7 @@ def faults(mutant: Mutant, path: Path) -> Iterator[str]:
 
 
 def _of_a_refusal(path: Path, said: str) -> Iterator[str]:
-    """Every line names a place: a line of the file, the file, or an override."""
+    """Yield faults of a refusal; every line must name a line, a file or an override."""
     lines = said.removesuffix("\n").split("\n")
     place = re.compile(rf"fretscale: ({re.escape(str(path))}(:\d+)?|--set .*?): \S")
     yield from (f"no place: {line}" for line in lines if not place.match(line))
@@ -84,7 +84,7 @@ def _of_a_refusal(path: Path, said: str) -> Iterator[str]:
 
 
 def _of_an_accepted_one(mutant: Mutant, path: Path, said: str) -> Iterator[str]:
-    """What is taken has numbers only, and reads back as it is written."""
+    """Yield faults of an accepted case; it must have only numbers and be read back unchanged."""
     outline = said.partition("\n")[2]
     if re.search(r"\b(nan|inf|None)\b", outline):
         yield f"no numbers: {outline}"
@@ -107,12 +107,12 @@ def test_whatever_is_wrong_is_told_in_its_place(block: int, folder: Path, mutant
 
 
 class TooLong(BaseException):
-    """Ends what takes too long; no error that a command would make a line of."""
+    """Exception that ends slow work and is no error that a command would report in a line."""
 
 
 @contextmanager
 def alarm(seconds: float) -> Iterator[None]:
-    """Raises TooLong in what takes the processor longer, however busy the machine is."""
+    """Raise TooLong in work that exceeds a processor time, however busy the machine is."""
 
     def late(*_: object) -> None:
         raise TooLong
@@ -142,7 +142,7 @@ def _numbers(summary: Any) -> Iterator[float]:
 @posix_only
 @pytest.mark.slow
 def test_what_is_accepted_runs_or_says_why_not(tmp_path: Path) -> None:
-    """Small cases that ``check`` takes: an exit code of ours, one line, no NaN in the summary."""
+    """Small accepted cases end with one of our exit codes, one line, and no NaN."""
     small = Mutants({"ball": scenes.BALL + QUIET, "roller": scenes.ROLLER_WEAR})
     (tmp_path / "loads.csv").write_text(scenes.ROLLER_LOADS, encoding="utf-8")
     path, looked_at = tmp_path / "mutant.yaml", 0

@@ -1,7 +1,7 @@
-"""The plan of the house: no circle of imports, nobody asks what kind a case is, few files flat.
+"""Rules of the code structure: no import cycles, no checks for kinds of case, few flat files.
 
-Layers are contracts of import-linter (pyproject.toml). Everything is read, nothing imported:
-imports inside functions and those for types count like all others.
+Layers are contracts of import-linter (pyproject.toml). The source is parsed without importing it;
+imports inside functions and for types count like all others.
 """
 
 import ast
@@ -21,7 +21,7 @@ MOST_FLAT_FILES = 6
 
 @cache
 def modules(package: str) -> dict[str, ast.Module]:
-    """The modules of a package by their dotted names."""
+    """Return the modules of a package by their dotted names."""
     parsed = {}
     for path in sorted((ROOT / package).rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
@@ -31,7 +31,7 @@ def modules(package: str) -> dict[str, ast.Module]:
 
 
 def imported(module: ast.Module, known: dict[str, ast.Module]) -> Iterator[str]:
-    """The modules among those ``known`` that one imports, wherever in it."""
+    """Yield the ``known`` modules that a module imports anywhere."""
     for node in ast.walk(module):
         if isinstance(node, ast.ImportFrom):
             assert node.level == 0, "relative imports are not looked for here"
@@ -51,13 +51,13 @@ def test_no_circle_of_imports(package: str) -> None:
 
 
 def owner(module: str) -> str:
-    """The folder that a module belongs to: an analysis, or what else there is in workflow."""
+    """Return the folder that a module belongs to: an analysis, or another part of workflow."""
     parts = module.split(".")
     return ".".join(parts[:3] if parts[1:2] == ["analyses"] else parts[:2])
 
 
 def kinds_of_case(known: dict[str, ast.Module]) -> dict[str, str]:
-    """The classes that derive from Case, however far, and the folder of each."""
+    """Return the direct and indirect subclasses of Case, with the folder of each."""
     classes = {
         node.name: (owner(name), {ast.unparse(base).partition("[")[0] for base in node.bases})
         for name, module in known.items()
@@ -73,7 +73,7 @@ def kinds_of_case(known: dict[str, ast.Module]) -> dict[str, str]:
 
 
 def names_asked_for(module: ast.Module) -> Iterator[tuple[int, str]]:
-    """Line and name of every class that something is held against."""
+    """Yield line and name of every class in an isinstance check or a comparison of types."""
     for node in ast.walk(module):
         asked: ast.AST | None = None
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("isinstance", "issubclass"):

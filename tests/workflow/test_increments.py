@@ -1,4 +1,4 @@
-"""``load_path.increments: auto``: what is chosen is enough, is written down, and stays chosen."""
+"""Tests of ``load_path.increments: auto``: the choice suffices, is recorded and is kept."""
 
 import json
 import re
@@ -42,7 +42,7 @@ MANY = 64, 112
 
 @pytest.fixture
 def blocks(tmp_path: Path) -> Path:
-    """A cube on a larger one, pressed harder as it is pushed to and fro: much of it slides."""
+    """Return a cube on a larger one, pressed harder while it is pushed: much of it slides."""
     (tmp_path / "blocks.inp").write_text(cube("base", 2.0) + cube("foot", 1.0) + ASSEMBLY, "utf-8")
     pressed, pushed = BLOCKS["loads"]
     loads = [pressed | {"path": [1, 1, 1.5, 1]}, pushed | {"force": ["18 N", 0, 0]}]
@@ -72,7 +72,7 @@ def test_dovetails_wear_as_in_very_many(settings, tolerance):
 
 @pytest.mark.slow
 def test_increments_are_of_second_order():
-    """From 6 to 176 in depth, root mean square; energy passes its limit before 11."""
+    """The rms depth is of second order from 6 to 176; energy passes its limit before 11."""
     case = load_case(PLANE)
     cycles = {6: (2, 4)} | {11 * 2**k: (4 * 2**k, 7 * 2**k) for k in range(5)}
     fine = unworn(case, dovetail_joint, (256, 448))
@@ -97,7 +97,7 @@ def test_legs_of_a_mesh_get_what_each_asks_for(blocks):
 
 @pytest.mark.slow
 def test_a_run_is_of_what_was_chosen_and_tells_it_once(tmp_path, monkeypatch):
-    """Killed and gone on with too, where nothing is chosen again."""
+    """A killed and resumed run has the same choice, since nothing is chosen again."""
     overrides = [AUTO, *COARSE]
     with ctrl_c_after_jumps(2):
         ending = command("run", PLANE, "--out", tmp_path / "out", overrides=overrides)

@@ -1,4 +1,4 @@
-"""``import fretscale``: cases from dictionaries, runs, and results as arrays and tables."""
+"""Tests of ``import fretscale``: cases from dictionaries, runs, and results as arrays."""
 
 import os
 import shutil
@@ -13,7 +13,7 @@ from tests.workflow.interruptions import ctrl_c_after_jumps
 
 SPHERE = CASES / "sphere_normal.yaml"
 SMALL = {"contact__grid": [32, 32], "output__paraview": False, "output__figures": False}
-# A ball that is pressed, and pushed to and fro.
+# A ball that is pressed, and pushed back and forth.
 BALL = {
     "title": "Ball on a flat",
     "analysis": "contact",
@@ -167,7 +167,7 @@ def test_an_interrupted_run_goes_on(tmp_path):
 
 
 def labelled(group):
-    """All datasets of a group; their axes are as long as what these are said to be along."""
+    """Return all datasets of a group, after checking their axes against their labels."""
     for item in group.values():
         if isinstance(item, fretscale.Group):
             yield from labelled(item)
@@ -288,7 +288,7 @@ def test_results_that_another_run_has_replaced_are_not_read(ball, tmp_path):
 
 
 def test_results_may_lie_without_the_files_that_they_came_from(ball, tmp_path, monkeypatch):
-    """A colleague has the folder, and not what its case names."""
+    """A colleague has the folder, but not the files that its case names."""
     folder = shutil.copytree(ball.folder, tmp_path / "out")
     from workflow.shell.folder import OutputFolder
 

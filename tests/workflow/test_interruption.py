@@ -1,4 +1,4 @@
-"""A run that is interrupted, killed or fails goes on as if nothing had happened."""
+"""A run that is interrupted, killed or fails is resumed with identical results."""
 
 import os
 import re
@@ -33,7 +33,7 @@ from workflow.shell.store import read_arrays, write_arrays
 
 @pytest.fixture(scope="module")
 def stopped(start, tmp_path_factory):
-    """A run that got Ctrl-C once two jumps were kept; not to be changed."""
+    """Return a run that got Ctrl-C after two stored jumps, which tests must not change."""
     with ctrl_c_after_jumps(2):
         run = start(tmp_path_factory.mktemp("stopped") / "out")
     assert run.ending.exit_code == 130
@@ -45,7 +45,7 @@ def stopped(start, tmp_path_factory):
 
 @pytest.fixture
 def interrupted(stopped, tmp_path):
-    """A copy of it to go on with."""
+    """Return a copy of the interrupted run, to resume it."""
     folder = tmp_path / "out"
     shutil.copytree(stopped.folder, folder)
     return replace(stopped, folder=folder)
@@ -62,7 +62,7 @@ def test_resumed_run_equals_an_uninterrupted_one(interrupted, resume, whole):
 
 
 def test_states_are_written_as_time_allows(monkeypatch):
-    """Of short jumps now and then, of long ones each, and the last one; no clock but this one's."""
+    """Of short jumps some are stored, of long ones each, and the last; the clock is simulated."""
     now, cost = [0.0], 0.05
     written: list[int] = []
 
@@ -111,7 +111,7 @@ def test_unfinished_run_is_not_started_again(interrupted, start):
 
 @pytest.mark.slow
 def test_what_a_kill_left_half_written_does_not_matter(interrupted, resume, whole):
-    """A torn checkpoint beside the whole one, a torn jump, torn results."""
+    """There is a torn checkpoint next to the complete one, a torn jump, and torn results."""
     torn = (interrupted.folder / "checkpoint.h5").read_bytes()[:1000]
     for name in (".checkpoint.h5.99999.part.h5", "jumps/.00003.h5.9.part.h5", "jumps/00003.h5"):
         (interrupted.folder / name).write_bytes(torn)
@@ -135,7 +135,7 @@ def written_by_others(folder):
 
 
 def deeper(folder):
-    """One worn depth, by whoever knows HDF5."""
+    """Change one worn depth, as a user of HDF5 could."""
     with h5py.File(folder / "checkpoint.h5", "r+") as file:
         file["kinetics"][1, 0, 0] *= 2.0
 
@@ -164,7 +164,7 @@ def exchanged(folder):
 
 
 def rewritten(folder):
-    """A whole file of that name, such as another run has left."""
+    """Write a complete file of that name, as another run would."""
     path = folder / "jumps/00001.h5"
     arrays, attributes = read_arrays(path)
     write_arrays(path, arrays, attributes | {"cycles": 1.0})
@@ -208,14 +208,14 @@ def test_what_is_not_of_the_run_is_one_line_before_it_computes(
 
 
 def edit(path, written, instead):
-    """Write something else where it is ``written`` first."""
+    """Replace the first occurrence of ``written``."""
     text = path.read_text("utf-8")
     assert written in text
     path.write_text(text.replace(written, instead, 1), encoding="utf-8")
 
 
 def test_state_that_the_manifest_does_not_list_is_not_touched(interrupted, resume):
-    """It would be set aside as what is not of the run."""
+    """It would be renamed as a file that does not belong to the run."""
     edit(interrupted.folder / "manifest.json", "jumps", "jump5")
     run = resume(interrupted.folder)
     assert run.ending.exit_code == 2
@@ -247,7 +247,7 @@ def test_another_case_does_not_go_on(interrupted, resume):
 
 
 def test_state_of_another_case_is_not_taken(interrupted, start, resume, tmp_path, monkeypatch):
-    """Nor with all of its jumps."""
+    """It is not used even with all of its jumps."""
     with monkeypatch.context() as patch:
         patch.setattr(workflow.analyses.wear.run, "write_output", refuse)
         other = start(tmp_path / "other", "wear.cycles=1e4", "friction.coefficient=0.45")
@@ -336,7 +336,7 @@ def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeyp
 
 
 def die(messages, answers, code):
-    """A worker that is killed."""
+    """Act as a worker that is killed."""
     os._exit(code)
 
 
@@ -347,7 +347,7 @@ def test_worker_that_dies_is_one_line():
 
 
 def stepwise(to, done):
-    """A worker that counts up to a number from where it was left, and says so."""
+    """Act as a worker that counts up from its last number and reports each step."""
     steps = iter(range(to))
 
     def answer(method, count):
@@ -371,7 +371,7 @@ def test_workers_tell_what_they_have_done_before_they_answer():
 
 @posix_only
 def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
-    """It ends while it is told what to do: a large setting does not go into the pipe at once."""
+    """It ends while it receives its task: a large setting does not fit into the pipe at once."""
     monkeypatch.setattr(sys, "executable", "/bin/true")
     gone = pytest.raises(MethodFailed, match="a process of the run has gone")
     with closing(workers.Beside()) as beside, gone:
@@ -380,7 +380,7 @@ def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
 
 @pytest.mark.slow
 def test_worker_that_cannot_be_set_up_says_why(separate_processes):
-    """What goes wrong in a worker is raised here, not printed there."""
+    """An error in a worker is raised here, not printed there."""
     with (
         contact_workers.contact_workers(None, [None]) as team,
         pytest.raises(AttributeError, match="'NoneType'"),
@@ -390,7 +390,7 @@ def test_worker_that_cannot_be_set_up_says_why(separate_processes):
 
 @posix_only
 def test_workers_are_born_deaf_to_ctrl_c():
-    """From their first instruction: the terminal sends it to the session of the parent."""
+    """Workers ignore it from the start: the terminal sends it to the parent's session."""
     with closing(workers.Beside()) as one, closing(workers.Beside()) as other:
         sessions = [process.begin(os.getsid, 0)() for process in (one, other)]
     assert len({os.getsid(0), *sessions}) == 3

@@ -1,4 +1,4 @@
-"""Runs in processes that are killed or hear Ctrl-C: none is lost, nothing is left over."""
+"""Run processes that are killed or get Ctrl-C lose no results and leave nothing behind."""
 
 import os
 import random
@@ -33,7 +33,7 @@ EVERY_JUMP = "from workflow.shell import steps; steps.SHARE = float('inf'); "
 
 
 class Process:
-    """The command as a process with its own group."""
+    """Command as a process with its own group."""
 
     def __init__(self, *arguments: object) -> None:
         command = [sys.executable, "-c", EVERY_JUMP + AS_PROCESS, *map(str, arguments)]
@@ -42,7 +42,7 @@ class Process:
         )
 
     def descendants(self) -> list[int]:
-        """Processes below it, where the system tells."""
+        """Return the processes below it, if the system reports them."""
         descendants, queue = [], [self._process.pid]
         while queue:
             path = Path(f"/proc/{queue.pop()}/task")
@@ -58,7 +58,7 @@ class Process:
         return descendants
 
     def ended(self, seconds: float) -> bool:
-        """Whether it ends within so many seconds."""
+        """Return whether it ends within this number of seconds."""
         try:
             self._process.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -66,26 +66,26 @@ class Process:
         return True
 
     def kill(self) -> None:
-        """Kill it and nothing below it."""
+        """Kill the process itself, but no process below it."""
         self._process.kill()
         self._process.wait()
 
     def interrupt(self) -> None:
-        """Ctrl-C: the whole group gets it."""
+        """Send Ctrl-C to the whole group."""
         os.killpg(self._process.pid, signal.SIGINT)
 
     def terminate(self) -> None:
-        """What batch systems do first: only the command gets it."""
+        """Send the first signal of a batch system, only to the command."""
         self._process.terminate()
 
     def finish(self) -> tuple[int, str]:
-        """Exit code and everything on stderr."""
+        """Return the exit code and everything on stderr."""
         _, text = self._process.communicate(timeout=PATIENCE)
         return self._process.returncode, text
 
 
 def alive(pid: int) -> bool:
-    """Whether a process runs; one that only waits to be buried does not."""
+    """Return whether a process runs; a zombie does not."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -93,7 +93,7 @@ def alive(pid: int) -> bool:
 
 
 def works(pid: int) -> bool:
-    """Whether it is a worker: libraries too start short processes, while they are imported."""
+    """Return whether it is a worker: libraries also start short processes while imported."""
     try:
         return workers.COMMAND.encode() in Path(f"/proc/{pid}/cmdline").read_bytes()
     except OSError:
@@ -117,7 +117,7 @@ def command(small_path: Path, folder: Path) -> list[object]:
 
 @pytest.fixture(scope="module")
 def reference(start, tmp_path_factory):
-    """The run of many jumps, undisturbed, its contacts in processes of their own."""
+    """Return an undisturbed run of many jumps, with its contacts in separate processes."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact_workers, "workers", workers.workers)
         run = start(tmp_path_factory.mktemp("reference") / "out", *MANY)
@@ -127,7 +127,7 @@ def reference(start, tmp_path_factory):
 
 
 def kill_and_resume(small_path, folder, moments):
-    """Kill the run, and every resumption; returns how many were hit.
+    """Kill the run, and every resumption; return how many were hit.
 
     ``moments`` are pairs: the jump to wait for, or None, and the seconds after it.
     """
@@ -167,7 +167,7 @@ def test_three_kills_lose_nothing(small_path, resume, reference, separate_proces
 def test_kills_at_random_moments_lose_nothing(
     small_path, resume, reference, separate_processes, tmp_path
 ):
-    """At random moments of the run, of its output and of its start."""
+    """The run is killed at random moments of its work, its output and its start."""
     dice, kills, number = random.Random(20), 0, 0
     while kills < KILLS:
         folder = tmp_path / f"out{number}"
@@ -178,7 +178,7 @@ def test_kills_at_random_moments_lose_nothing(
 
 
 def assert_equal_after(resume, folder, reference):
-    """Resume to the end, if it is not reached, and compare."""
+    """Resume to the end, if necessary, and compare."""
     run = resume(folder)
     assert_equal(run, reference)
     assert not list(folder.rglob("*.part.*"))
@@ -189,7 +189,7 @@ def assert_equal_after(resume, folder, reference):
 def test_kill_while_the_checkpoint_is_written(
     small_path, resume, reference, separate_processes, tmp_path
 ):
-    """The half of it that is on disk is not the checkpoint."""
+    """A half-written file is not taken for the checkpoint."""
     code = """
 import os, signal, sys
 from workflow.shell import checkpoint, store
@@ -218,7 +218,7 @@ main()
 
 
 def interrupt(small_path, folder, began, stop=Process.interrupt):
-    """Stopped as soon as the run has begun what ``began`` looks for: one line, and all gone."""
+    """Stop a run once it has begun what ``began`` looks for; one line is left, no process."""
     process = Process(*command(small_path, folder))
     assert wait_until(lambda: began(process), PATIENCE)
     below = process.descendants()

@@ -1,4 +1,4 @@
-"""Progress, log, terminal, figures and report may each fail: the run goes on as without that."""
+"""Progress, log, terminal, figures and report may each fail without ending the run."""
 
 import errno
 import json
@@ -40,12 +40,12 @@ output: {figures: [svg], paraview: false}
 
 
 def fails(*arguments: object, **settings: object) -> Any:
-    """Fail as what nobody thought of does."""
+    """Raise an unexpected error."""
     raise TypeError("made up to fail")
 
 
 class FullLog:
-    """A log on a disk that has no room."""
+    """Log on a disk without room."""
 
     def write(self, text: str) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -94,7 +94,7 @@ FAILURES: dict[str, tuple[str, Callable[[pytest.MonkeyPatch], Any]]] = {
 
 
 def run(folder: Path) -> dict[str, Any]:
-    """The summary of a run of the case."""
+    """Return the summary of a run of the case."""
     path = folder / "case.yaml"
     path.write_text(CASE, encoding="utf-8")
     with runs_here():
@@ -119,7 +119,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
 def test_what_only_shows_a_run_fails_and_the_run_does_not(
     what: str, whole: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Results are those of a run that nothing failed in, and one warning says what is missing."""
+    """Results equal those of a run without failures, and one warning names what is missing."""
     folder, summary = whole
     said, fail = FAILURES[what]
     fail(monkeypatch)
@@ -134,8 +134,10 @@ def test_what_only_shows_a_run_fails_and_the_run_does_not(
 
 
 def test_a_force_that_is_raised_is_no_progress_along_frequencies() -> None:
-    """From rest the force is raised, along a curve of its own: whoever watches the curve along
-    frequencies was told forces as frequencies, and forecast a share of the work below 0."""
+    """Raising the force from rest follows a separate curve, which must not count as progress.
+
+    Otherwise forces are reported as frequencies, and the forecast gets a share below 0.
+    """
     model = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], damping_ratio=0.02)
     spring = PeriodicMarch(PolynomialSpring(0.0, cubic=1.0))
     load = PeriodicLoad({1: unit_force(model, "m")})

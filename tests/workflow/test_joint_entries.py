@@ -1,4 +1,4 @@
-"""Joints with laws of their own: in a row of masses, at places of a body, steady and in time."""
+"""Tests of joints with separate laws: in a row of masses, on a body, steady and in time."""
 
 from math import copysign
 from pathlib import Path
@@ -55,7 +55,7 @@ def model_of(folder: Path, text: str, *overrides: str) -> VibrationModel:
 
 
 def central_differences(damping, force, frequency, steps=1000, periods=30):
-    """Both masses in the last of many periods, by an explicit method and the laws written out."""
+    """Return both masses in the last of many periods, by an explicit method and plain laws."""
     step = 1.0 / (steps * frequency)
     inverse = np.linalg.inv(MASSES / step**2 + damping / (2.0 * step)).tolist()
     back = (MASSES / step**2 - damping / (2.0 * step)).tolist()
@@ -80,7 +80,7 @@ def central_differences(damping, force, frequency, steps=1000, periods=30):
 
 
 def test_two_laws_are_the_motion_of_an_explicit_method(tmp_path):
-    """The slider slips and the stop is struck; Newmark's method with the same law agrees too."""
+    """The slider slips and the stop is hit; Newmark's method with the same laws agrees too."""
     model = model_of(tmp_path, CASE)
     motion = model.problem.solve(110.0, 40.0)
     assert motion.converged
@@ -100,7 +100,7 @@ def test_two_laws_are_the_motion_of_an_explicit_method(tmp_path):
 
 
 def test_a_stop_is_grazed_beside_a_slider(tmp_path):
-    """Below grazing the motion is that without the stop; there it begins to push, at the gap."""
+    """Below grazing the motion is that without the stop, which begins to push at the gap."""
     model = model_of(tmp_path, CASE)
     without = model_of(
         tmp_path, CASE, f"structure.joints=[{{points: m2, against: m1, joint: {SLIDER}}}]"
@@ -126,7 +126,7 @@ def test_a_stop_is_grazed_beside_a_slider(tmp_path):
 
 
 def test_masses_that_do_not_meet_move_as_each_alone(tmp_path):
-    """A slider on one, a spring that hardens on the other, in one case and in two."""
+    """One has a slider, the other a hardening spring, in one case and in two."""
     apart = [
         "structure.masses=[2 kg, 1 kg]",
         "structure.springs=[1 N/um, 0 N/um]",
@@ -154,7 +154,7 @@ def test_masses_that_do_not_meet_move_as_each_alone(tmp_path):
 
 
 def test_a_run_tells_what_each_joint_does(tmp_path):
-    """Table, results and figure; the loop is that of the entry that is asked for."""
+    """Table, results and figure report each joint; the loop is that of the requested entry."""
     settings = [
         *("frequencies=[100 Hz, 130 Hz]", "resolution={harmonics: [0, 1, 2, 3], samples: 64}"),
         *("loops={frequency: 110 Hz, joints: 1}", "stability=none", "forces=[40 N]"),
@@ -237,7 +237,7 @@ def body(tmp_path) -> Path:
 
 
 def test_a_mass_beside_a_body_is_held_by_joints_and_springs(body):
-    """The linear limits are those of matrices that are put together by hand."""
+    """The linear limits are those of matrices assembled by hand."""
     model = model_of(body, ON_BODY)
     rig = model.rig
     assert rig.counts == [1, 1]
@@ -258,7 +258,7 @@ def test_a_mass_beside_a_body_is_held_by_joints_and_springs(body):
 
 
 def test_a_body_with_a_damper_is_a_row_of_three_masses(body):
-    """Along x: the same motion, told by the damper's name."""
+    """The motion along x is the same, reported under the damper's name."""
     damper = f"{{points: damper, against: holder, direction: x, joint: {SLIDER}}}"
     on_body = model_of(
         body,
@@ -286,7 +286,7 @@ def test_a_body_with_a_damper_is_a_row_of_three_masses(body):
 
 
 def test_a_damper_on_own_matrices_under_a_load(tmp_path):
-    """The same row of three masses; the load of the matrices does not act on the third."""
+    """It is the same row of three masses; the matrices' load does not act on the third."""
     load = np.array([[1.0], [0.0]])
     np.savez(tmp_path / "two.npz", K=SPRINGS, M=MASSES, F=load)
     (tmp_path / "unknowns.csv").write_text("point,direction\nblock,x\nholder,x\n", "utf-8")
@@ -327,7 +327,7 @@ resolution: {{harmonics: 3, samples: 64}}
 
 
 def test_in_time_those_of_their_own_stay_as_they_are(tmp_path):
-    """The joint of the case evolves, and its energy is that of its own joints."""
+    """Only the shared joint of the case evolves, with the energy of its own joints."""
     text = CASE.replace("analysis: vibration", "analysis: time").partition("forces:")[0]
     text = text.replace(f", joint: {SLIDER}", "") + (
         f"joint: {SLIDER}\nevolution: {{friction: {{kind: linear, slope: 1 1/J}}}}\n"
@@ -346,7 +346,7 @@ def test_in_time_those_of_their_own_stay_as_they_are(tmp_path):
 
 
 def test_a_row_has_the_joint_of_the_case_behind_its_last_mass(tmp_path):
-    """Beside those that have a law of their own; none where no law is shared."""
+    """It is added to joints with separate laws, unless no law is shared."""
     beside = model_of(tmp_path, CASE, f"joint={HARDENS}")
     np.testing.assert_array_equal(beside.rig.model.connection, [[-1, 1], [0, 1], [0, 1]])
     assert [group.law.stiffness for group in beside.law.groups] == [KT, STIFF, 500.0]
@@ -397,7 +397,7 @@ def test_nonsense_beside_a_body_is_refused(body, overrides, said):
 
 
 def test_a_contact_that_wears_is_alone():
-    """Joints beside it are refused, and none are offered."""
+    """Further joints are refused, and the template offers none."""
     assert "joints" not in template("vibration_wear")
     cases = Path(__file__).parents[2] / "cases"
     joints = f"structure.joints=[{{points: m2, joint: {STOP}}}]"

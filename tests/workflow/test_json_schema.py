@@ -1,4 +1,4 @@
-"""The schema that editors take: standard, told of in full, and the same as what a case may be."""
+"""The schema for editors is standard, fully described, and accepts every valid case."""
 
 import json
 
@@ -62,7 +62,7 @@ def test_every_entry_is_described(schema):
 
 @pytest.mark.parametrize("kind", kinds())
 def test_fixed_words_tell_the_kinds_apart(schema, kind):
-    """An editor then proposes nothing but the entries of the kind."""
+    """An editor then proposes only the entries of the kind."""
     (case,) = [d for d in schema["$defs"].values() if d.get("title") == kind]
     assert case["description"] == about()[kind]
     assert case["additionalProperties"] is False
@@ -129,7 +129,7 @@ def test_what_must_be_there_is_not_empty(validator, none):
 
 
 def test_what_stands_for_nothing_is_valid(validator):
-    """As the loader has it: an entry of nothing is one that is not given."""
+    """An empty entry is one that is not given, as for the loader."""
     case = plain(template("dovetail"))
     case["structure"] |= {"dimension": 2, "end_width": None}
     del case["structure"]["end_radius"]
@@ -142,7 +142,7 @@ MUTANTS = 60
 
 @pytest.mark.parametrize("block", [0, *map(slow, range(1, 40))])
 def test_whatever_the_loader_takes_is_valid(validator, block, folders):
-    """The schema may know less than the loader, never more."""
+    """The schema may be less strict than the loader, but never stricter."""
     mutants, wrong = Mutants(sources()), []
     name = str(folders["resultants"] / "mutant.yaml")
     for number in range(block * MUTANTS, (block + 1) * MUTANTS):

@@ -1,4 +1,4 @@
-"""Long runs of every kind that are killed go on as if nothing had happened: to the last byte."""
+"""Long runs of every kind that are killed can be resumed with bitwise identical results."""
 
 import json
 import os
@@ -30,8 +30,8 @@ from workflow.shell.lock import LOCK
 from workflow.shell.steps import RunSteps
 from workflow.shell.store import read_arrays
 
-# Files that say when something happened, how long it took, or what was kept: no results. Who is
-# killed when all of them are written leaves the latter.
+# Files with times, durations or stored states, which are no results. A run that is killed after all
+# results are written leaves its stored states.
 NOT_RESULTS = {LOCK, "run.log", "checkpoint.h5", "manifest.json", "summary.json"}
 QUIET = "output={figures: false, paraview: false}"
 # In the report: how long each stage took.
@@ -60,14 +60,14 @@ PADS_THAT_WEAR = yaml.safe_dump(yaml.safe_load(PADS) | WORN)
 
 @dataclass(frozen=True)
 class LongRun:
-    """A case in ``text``, with ``files`` that it names and ``overrides``."""
+    """Case in ``text``, with ``files`` that it names and ``overrides``."""
 
     text: str
     overrides: tuple[str, ...] = ()
     files: tuple[tuple[str, str], ...] = ()
 
     def command(self, folder: Path, out: Path) -> list[object]:
-        """The command that runs it, its files being in a folder."""
+        """Return the command that runs it, with its files in a folder."""
         for name, text in (("case.yaml", self.text), *self.files):
             (folder / name).write_text(text, encoding="utf-8")
         settings = [part for entry in (QUIET, *self.overrides) for part in ("--set", entry)]
@@ -113,7 +113,7 @@ RUNS = {
 
 
 def results_of(out: Path) -> dict[str, object]:
-    """All that a run leaves, but for what is different in every run."""
+    """Return all results of a run, except those that differ in every run."""
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     del summary["seconds"], summary["digests"]["summary.json"]
     written = {
@@ -126,9 +126,9 @@ def results_of(out: Path) -> dict[str, object]:
 
 
 def counted(out: Path) -> tuple[int, int]:
-    """Steps that the last process of a run has computed, and taken as kept.
+    """Return the steps that the last process of a run has computed, and those it has restored.
 
-    Those of a wear run are its jumps, each of which is in the log of the process that has made it.
+    For a wear run these are its jumps, each of which is in the log of the process that computed it.
     """
     log = (out / "run.log").read_text("utf-8")
     told = re.findall(r"steps: (\d+) computed, (\d+) taken", log)
@@ -140,7 +140,7 @@ def counted(out: Path) -> tuple[int, int]:
 
 
 def kept_in(out: Path) -> int:
-    """Steps up to the last that a killed run has kept."""
+    """Return the number of steps that a killed run has stored."""
     path = out / "checkpoint.h5"
     if not path.exists():
         return 0
@@ -152,7 +152,7 @@ def kept_in(out: Path) -> int:
 
 
 class CutOff(BaseException):
-    """Ends a run where it is."""
+    """Exception that ends a run at some step."""
 
 
 def run_here(command: list[object]) -> None:
@@ -161,7 +161,7 @@ def run_here(command: list[object]) -> None:
 
 
 def cut(command: list[object], number: int) -> None:
-    """Run, but for the end of so many steps."""
+    """Run a case and end it at this number of steps."""
     keep, left = RunSteps._keep, [number]
 
     def keeping(*arguments):
@@ -182,7 +182,7 @@ EVERY_KIND = ["joint", *(slow(kind) for kind in RUNS if kind not in ("joint", "w
 
 @pytest.mark.parametrize("kind", EVERY_KIND)
 def test_every_step_can_be_the_last(kind, tmp_path):
-    """Wherever a run is cut off, the next one computes what is left and nothing again."""
+    """After an interruption at any step, the next run computes only what is missing."""
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     run_here(RUNS[kind].command(tmp_path, whole))
     reference, (total, _) = results_of(whole), counted(whole)
@@ -207,9 +207,9 @@ EVERY_STEP = (float("inf"), 0.0)
 
 @dataclass(frozen=True)
 class Kill:
-    """What a kill has hit: steps that were ``kept`` then, and ``before`` by earlier processes.
+    """State of a run when it was killed: steps ``kept`` then, and ``before`` by earlier processes.
 
-    ``lost`` are the seconds since the last of them was kept.
+    ``lost`` are the seconds since the last of them was stored.
     """
 
     before: int
@@ -220,9 +220,9 @@ class Kill:
 def killed(
     command: list[object], out: Path, seconds: float, saves: tuple[float, float]
 ) -> Kill | float:
-    """Run as a process, and kill it so long after it has begun; if it ends before, in how long.
+    """Run as a process and kill it after some seconds; return the run time if it ended before.
 
-    It has begun with the first step that it keeps, or if few are kept once its log says so.
+    Time counts from the first stored step, or from the first line of its log if few are stored.
     """
     log, path, before = out / "run.log", out / "checkpoint.h5", kept_in(out)
     mark = path if saves == EVERY_STEP else log
@@ -252,9 +252,9 @@ def kill_at_random(
     saves: tuple[float, float],
     most: int,
 ) -> tuple[list[Kill], float]:
-    """Kill a run and its resumptions at random moments of the ``whole`` seconds; it then ends.
+    """Kill a run and its resumptions at random moments of the ``whole`` seconds; then let it end.
 
-    With the seconds that are all of it where it ended before the first of them.
+    Returns the kills, and the total seconds if the run ended before the first of them.
     """
     kills: list[Kill] = []
     for _ in range(most):
@@ -274,10 +274,10 @@ def kill_at_random(
 
 
 def kills_of(kind: str, folder: Path, most: int) -> list[Kill]:
-    """Kill runs of a kind so often, each step kept as it ends, or as seldom as without a test.
+    """Kill runs of a kind ``most`` times, with each step stored or as rarely as in real use.
 
-    More than half as often after a process had gone further than those before it. What they leave
-    in the end is that of one that nobody has killed.
+    More than half of the kills must hit a process that had advanced beyond earlier ones. The final
+    results must equal those of an undisturbed run.
     """
     dice, kills, whole = random.Random(20), [], folder / "whole"
     begun = time.monotonic()

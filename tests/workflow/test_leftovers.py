@@ -1,4 +1,4 @@
-"""What a run that was killed behind its summary has left: whoever takes up the run removes it."""
+"""Files left by a run that was killed after its summary are removed when the run is resumed."""
 
 import json
 import os
@@ -28,14 +28,14 @@ PARTIAL = ".results.h5.123.part.h5"
 
 @dataclass(frozen=True)
 class CutOffRun:
-    """A run that nobody disturbed, and what a process leaves that is killed behind its summary."""
+    """Undisturbed run, and the files left by a process that was killed after its summary."""
 
     whole: Path
     cut: Path
 
 
 def cut_off(kind, folder) -> list[CutOffRun]:
-    """Where a run removes something at its end: before it does, and before that is listed."""
+    """Return runs killed at each removal at their end: before it, and before it is listed."""
     whole, cut = folder / "whole", []
     gone = {"process": 123, "host": socket.gethostname(), "since": "before"}
 
@@ -103,7 +103,7 @@ def test_whoever_takes_up_a_finished_run_clears_it(joint, take_up, tmp_path):
 
 
 def check_units_of_curves(run):
-    """What is measured is held against them before a run: they are those of its results."""
+    """Assert that the units against which measured points are checked are those of the results."""
     folder = OutputFolder(run)
     with h5py.File(folder.results) as file:
         for wanted in analysis_of(load_case(folder.case)).curves:

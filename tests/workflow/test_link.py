@@ -1,4 +1,4 @@
-"""The link of structure and contact in runs: dovetails, meshes that know more, both methods."""
+"""Tests of the link of structure and contact in runs: dovetails, fine meshes, both methods."""
 
 import json
 
@@ -44,7 +44,7 @@ def test_what_a_fit_leaves_is_warned_of(tmp_path, quality, told) -> None:
 
 
 def flank(path, nodes: int, *settings: str) -> tuple[InterfaceHistory, FaceContact, FirstContact]:
-    """The unworn intrados of the section, so many nodes of first-order elements across it."""
+    """Return the unworn intrados of the section with ``nodes`` first-order nodes across it."""
     case = load_case(path, [f"mesh.flank_nodes=[{nodes}, 34]", "mesh.order=1", *settings])
     source = structure_of(case).source(case)
     stage = face_contact(case, source.faces[0])
@@ -59,10 +59,10 @@ def at_places(x: Array, values: Array) -> Array:
 
 @pytest.mark.slow
 def test_a_coarse_mesh_and_the_link_give_what_a_fine_mesh_does(dovetail_path) -> None:
-    """Pressure in the flank of 20 nodes within 1.5 % of that of 160; half-spaces miss it by 18 %.
+    """The pressure for 20 nodes is within 1.5 % of that for 160; half-spaces are off by 18 %.
 
-    With its own friction the half-space slips as the structure does, within 1.5 % of its path:
-    without the link it does not bend, and misses that by up to 8 %.
+    With its own friction the half-space slips as the structure does, within 1.5 % of its path;
+    without the link it does not bend, and is off by up to 8 %.
     """
     path, peak = dovetail_path.with_name("dovetail_2d.yaml"), 7
     fine = flank(path, 160)[0]

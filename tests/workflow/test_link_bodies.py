@@ -1,6 +1,6 @@
-"""The link on bodies that are half-spaces, layers, strips or end beside the contact: mesh cases.
+"""Tests of the link for bodies that are half-spaces, layers, strips or end near the contact.
 
-What a coarse mesh and the link find is held against closed forms and fine meshes, and so is the
+Results of a coarse mesh with the link are compared with closed forms and fine meshes, and so is the
 half-space alone. Errors are those of :func:`tests.workflow.plane_blocks.error`.
 """
 
@@ -24,9 +24,9 @@ MODULUS = 200.0 / (1.0 - 0.3**2)
     ("size", "bodies", "wrong"), [(0.4, 0.035, 0.015), (0.1, 0.01, 0.006), (0.05, 0.004, 2e-3)]
 )
 def test_of_bodies_much_larger_than_the_contact_nothing_is_left(tmp_path, size, bodies, wrong):
-    """Blocks 40 times as thick as the contact is wide: d is the mesh's error, and Hertz is met.
+    """For blocks 40 times as thick as the contact, d is the mesh's error, and Hertz is met.
 
-    It is ten times smaller with eight times as many nodes. Half-spaces alone are right.
+    The error is ten times smaller with eight times as many nodes. Half-spaces alone are exact.
     """
     blocks = Blocks((-80, 80), 80, (-80, 80), 80, (-2.5, 2.5), materials=({}, {}), strips=4096)
     modulus = 200e3 / (2.0 * (1.0 - 0.3**2))
@@ -50,9 +50,9 @@ def test_of_bodies_much_larger_than_the_contact_nothing_is_left(tmp_path, size, 
     ],
 )
 def test_layers_and_strips(tmp_path, depth, hold, load, plain, wrong):
-    """A cylinder on a layer that sticks to a rigid base, or slides on it as half a strip does.
+    """A cylinder presses a layer that sticks to a rigid base, or slides on it as a half strip.
 
-    The contact is 2.0 to 4.8 mm wide and has 9 to 19 nodes; half-spaces miss it by more than
+    The contact is 2.0 to 4.8 mm wide and has 9 to 19 nodes; half-spaces are off by more than
     ``plain``.
     """
     blocks = Blocks((-25, 25), depth, (-5, 5), 5, (-5, 5), hold, strips=320)
@@ -68,14 +68,14 @@ def test_layers_and_strips(tmp_path, depth, hold, load, plain, wrong):
 
 
 def on_cells(stage, history, nodal: Array) -> Array:
-    """Nodal values along a face at its cells."""
+    """Return nodal values along a face at its cells."""
     x = history.interface.coordinates[:, 0]
     order = np.argsort(x)
     return np.interp(stage.grid.x.ravel(), x[order], nodal[order])
 
 
 def beside_an_edge(edge: float, height: float, **changes) -> Blocks:
-    """A foot over the end of a block, flush with it."""
+    """Return a foot over the end of a block, flush with it."""
     return Blocks((-25, edge), 20, (-edge, edge), height, (-edge, edge), **changes)
 
 
@@ -89,9 +89,9 @@ def beside_an_edge(edge: float, height: float, **changes) -> Blocks:
     ],
 )
 def test_a_cylinder_near_the_edge_of_a_block(tmp_path, edge, materials, load, plain):
-    """The contact is 2.2 mm wide, its middle 1.4 or 2 mm from the edge: 15 nodes for 71 or more.
+    """The contact is 2.2 mm wide, 1.4 or 2 mm from the edge: 15 nodes replace 71 or more.
 
-    The foot is rigid, or as soft as the block, and ends with it. Half-spaces miss it by more than
+    The foot is rigid, or as soft as the block, and ends with it. Half-spaces are off by more than
     ``plain``, the link by less than 2 %.
     """
     blocks = beside_an_edge(edge, 6, materials=materials)
@@ -106,10 +106,10 @@ def test_a_cylinder_near_the_edge_of_a_block(tmp_path, edge, materials, load, pl
 
 @pytest.mark.slow
 def test_a_rough_foot_near_the_edge_of_a_block(tmp_path):
-    """Pressed on, pushed to and fro with its own friction, lifted; against four times the nodes.
+    """The foot is pressed, pushed back and forth with friction, lifted; against 4 x the nodes.
 
-    Its pressure and shear at peak load and the energy of the cycle, with the link and without: the
-    block gives way towards its end, and so half-spaces lose a third too much in partial slip.
+    Compared are pressure and shear at peak load and the energy of the cycle, with and without the
+    link: the block is softer towards its end, so half-spaces lose a third too much in partial slip.
     """
     blocks = beside_an_edge(2.0, 4, materials=({}, {}))
     down = {"kind": "displacement", "group": "foot_z1", "displacement": [0, 0, -0.006]}

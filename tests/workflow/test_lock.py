@@ -1,4 +1,4 @@
-"""Two processes in one folder: the second is told who the first is, and a lock left is taken."""
+"""Tests of two processes in one folder: the holder is named, and an abandoned lock is taken."""
 
 import json
 import os
@@ -42,7 +42,7 @@ def out(tmp_path):
 
 @pytest.fixture
 def holder(out):
-    """Another process that holds the folder."""
+    """Start another process that holds the folder."""
     command = [sys.executable, "-c", HOLD, str(out)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "held\n"
@@ -58,7 +58,7 @@ def ball(tmp_path):
 
 
 def left_by(out, host, process=1):
-    """A lock that a process has left: of one that lives, if this machine were asked."""
+    """Write the lock of a process that has ended, with the number of a running one."""
     out.mkdir(exist_ok=True)
     told = {"process": process, "host": host, "since": "2026-01-02 03:04:05"}
     (out / LOCK).write_text(json.dumps(told))
@@ -112,7 +112,7 @@ def test_the_lock_of_a_process_that_was_killed_is_told_and_taken(out, holder, ba
 
 @posix_only
 def test_a_number_that_another_process_has_by_now_is_not_believed(out):
-    """The system's lock counts: process 1 lives, and has no lock."""
+    """Only the system's lock counts: process 1 runs, but holds no lock."""
     left_by(out, socket.gethostname())
     with locked(out) as gone:
         assert gone.startswith("process 1 on ")
@@ -120,7 +120,7 @@ def test_a_number_that_another_process_has_by_now_is_not_believed(out):
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="a file system of Linux")
 def test_where_no_folder_can_be_made_one_line_says_so(ball):
-    """/proc says that what is to be made is not there, which another process's removal says too."""
+    """/proc reports that the folder does not exist, as after a removal by another process."""
     ending = invoke("run", ball, "--out", "/proc/out")
     assert ending.exit_code == 2
     assert ending.stderr == "fretscale: /proc/out: No such file or directory\n"
@@ -161,7 +161,7 @@ def test_without_locks_of_the_system_what_is_written_counts(out, monkeypatch):
 
 @posix_only
 def test_many_who_want_a_folder_have_it_one_after_the_other(tmp_path):
-    """Locks come and go with their file: nobody holds one that is removed already."""
+    """Locks come and go with their file, and nobody holds one that is already removed."""
     code = """
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The table of tangential loops: written, read back, and refused where it is none."""
+"""Tests of the table of tangential loops: writing, reading, and refusals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""``fretscale loops``: a measured file in, a table and a figure out, nonsense in one line."""
+"""Tests of ``fretscale loops``: a measured file gives a table and a figure, or one error line."""
 
 import csv
 
@@ -22,7 +22,7 @@ def invoke(*arguments):
 
 
 def record(stroke=STROKE):
-    """Time [s], displacement [mm] and force [N] of a Jenkins joint at 100 Hz, with some noise."""
+    """Return time [s], displacement [mm] and force [N] of a noisy Jenkins joint at 100 Hz."""
     time = np.arange(int(CYCLES * 200 + 220)) / 20e3
     displacement = 0.5 * stroke * np.sin(2.0 * np.pi * 100.0 * time)
     law = Jenkins(STIFFNESS, FRICTION, LOAD)
@@ -90,7 +90,7 @@ def test_columns_may_have_other_names_units_and_company(measured, tmp_path):
 
 
 def test_strokes_that_rise_are_told_step_by_step(tmp_path):
-    """Two cycles each of 3, 6 and 12 µm; the account says where all the work of the record is."""
+    """With two cycles each of 3, 6 and 12 µm, the report accounts for all work of the record."""
     wave = np.sin(2.0 * np.pi * np.arange(400) / 200)
     motion = np.concatenate([3e-3 * wave, 6e-3 * wave, 12e-3 * wave, [0.0]])
     law = Jenkins(20e3, 0.5, 60.0)

@@ -1,4 +1,4 @@
-"""Materials by name: what they stand for, what may be changed beside them, where mass counts."""
+"""Tests of materials by name: their values, changes to them, and where mass matters."""
 
 import pytest
 
@@ -14,7 +14,7 @@ NUMBERS = "{young: 113.8 GPa, poisson: 0.342, density: 4430 kg/m^3, yield_stress
 
 
 def refused(path, *overrides):
-    """The line that refuses a case."""
+    """Return the line that refuses a case."""
     with pytest.raises(CaseError) as refusal:
         load_case(path, overrides)
     (line,) = str(refusal.value).splitlines()
@@ -23,7 +23,7 @@ def refused(path, *overrides):
 
 @pytest.mark.parametrize("name", MATERIALS)
 def test_they_are_metals_and_ceramics_in_their_own_units(name):
-    """Of a slip in a unit or a digit: within what any of them has, and their waves' speed too."""
+    """Values and wave speeds are in the range of real materials, so no unit or digit is wrong."""
     known = MATERIALS[name]
     assert 60.0 < known.young < 450.0
     assert 0.2 < known.poisson < 0.35
@@ -51,7 +51,7 @@ def test_what_is_given_beside_a_name_stands(dovetail_path):
 
 
 def test_an_override_goes_into_a_name(dovetail_path):
-    """As into a section: a sweep may vary an entry of what is named."""
+    """An override changes an entry of a named material, as in a sweep."""
     overrides = ["materials.blade=Ti-6Al-4V", "materials.blade.young=110 GPa"]
     blade = load_case(dovetail_path, overrides).materials.blade
     assert (blade.material, blade.young, blade.poisson) == ("Ti-6Al-4V", 110e3, 0.342)

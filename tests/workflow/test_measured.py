@@ -1,4 +1,4 @@
-"""Measured points beside computed curves: known deviations, and what cannot be compared."""
+"""Tests of measured points and computed curves: known deviations, and refused comparisons."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_noise_of_known_size_has_its_chi_square_and_points_on_the_curve_have_non
     noise = np.random.default_rng(7).normal(0.0, sigma, places.size)
     points = Points(places, 2.0 * places + 1.0 + noise, np.full(places.size, sigma))
     found = told(compared(entry(), line, points))
-    # Of n independent points chi² per point is 1, give or take sqrt(2/n).
+    # For n independent points chi² per point is 1 with a standard deviation of sqrt(2/n).
     assert abs(found["reduced_chi_square"] - 1.0) < 4.0 * np.sqrt(2.0 / places.size)
     assert found["mean_deviation"] == pytest.approx(-noise.mean(), abs=1e-14)
     assert found["rms_deviation"] == pytest.approx(np.sqrt(np.mean(noise**2)))
@@ -141,7 +141,7 @@ def test_entries_that_disagree_are_refused(given: dict[str, Any], wrong: str) ->
 
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
-    """Depth and volume of a contact, one a thousand times the other in numbers."""
+    """Return depth and volume of a contact, whose numbers differ by a factor of a thousand."""
     path = tmp_path / "results.h5"
     cycles = np.linspace(0.0, 1e4, 51)
     with h5py.File(path, "w") as file:

@@ -1,4 +1,4 @@
-"""Mesh cases of more than two bodies, whose contacts have friction, wear and grids of their own."""
+"""Tests of mesh cases with more than two bodies and separate settings for each contact."""
 
 import h5py
 import numpy as np
@@ -27,7 +27,7 @@ def strip(name, low, high, across):
 
 @pytest.fixture
 def strips(tmp_path):
-    """A shim between a base and a pad that is pressed and pushed to and fro."""
+    """Return a shim between a base and a pad that is pressed and pushed back and forth."""
     bodies = [strip(name, *layer) for name, layer in LAYERS.items()]
     write_msh(tmp_path / "strips.msh", StructureMesh(tuple(bodies), ()))
     structure = {
@@ -73,7 +73,7 @@ def strips(tmp_path):
 
 
 def test_each_contact_wears_by_its_own_terms(strips, tmp_path):
-    """The upper contact slips at its own friction, and its bodies lose as their laws say."""
+    """The upper contact slips at its friction, and its bodies wear by their laws."""
     numbers = run(strips, tmp_path / "out")
     lower, upper = numbers["lower"], numbers["upper"]
     for contact in (lower, upper):
@@ -96,7 +96,7 @@ def test_each_contact_wears_by_its_own_terms(strips, tmp_path):
 
 @pytest.mark.slow
 def test_bodies_that_stay_as_they_are_are_condensed_once(strips, tmp_path, monkeypatch):
-    """Another shim: base and pad come from the cache, and nothing is another number for it."""
+    """With another shim, base and pad come from the cache, and no number changes."""
     # A load more, which acts on the shim alone.
     warm = "{kind: temperature, body: shim, change: 10 K, path: [0, 1, 1, 1, 1]}"
 
@@ -173,7 +173,7 @@ def test_method_full_takes_each_friction(strips, tmp_path):
 
 
 def test_materials_are_each_bodys_own(strips, tmp_path):
-    """A shim a thousand times as soft is all that gives."""
+    """If the shim is a thousand times as soft, only the shim deforms."""
     stiff = STEEL | {"poisson": 0.01}
     soft = {"young": "0.2 GPa", "poisson": 0.01, "density": "1000 kg/m^3"}
     numbers = run(

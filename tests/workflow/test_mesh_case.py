@@ -1,4 +1,4 @@
-"""Mesh cases through the whole road, in space and in the plane, and refusals."""
+"""Tests of complete runs of mesh cases, in space and in the plane, and of refusals."""
 
 import json
 
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.usefixtures("reads_here")
 
 
 def test_density_is_for_loads_on_the_mass(blocks):
-    """Pressures need none; what turns or is accelerated does, and says why."""
+    """Rotation and acceleration need a density, and the message says so; pressures do not."""
     steel = "{young: 200 GPa, poisson: 0.3}"
     bare = [f"materials.body_{number}={steel}" for number in (1, 2)]
     assert load_case(blocks, bare).material(1).density == 0.0
@@ -66,7 +66,7 @@ def test_parts_and_instances_run(blocks, tmp_path):
 
 
 def test_a_contact_may_be_called_as_a_body(blocks, tmp_path):
-    """Both have errors of their own."""
+    """Both have separate errors."""
     edit(blocks, "name: foot", "name: Foot-1")
     summary = run(blocks, tmp_path / "out")
     assert {"depth", "volume", "peak_pressure"} <= summary["Foot-1"]["error"].keys()
@@ -77,7 +77,7 @@ def test_a_contact_may_be_called_as_a_body(blocks, tmp_path):
 
 
 def test_worn_faces_come_back_at_the_users_nodes(blocks, tmp_path):
-    """By the numbers of the file: the top of the base and the bottom of the foot."""
+    """The top of the base and the bottom of the foot have the node numbers of the file."""
     edit(blocks, "4 N", "18 N")  # of the 20 N at which all of the foot slides: some of it does
     summary = run(blocks, tmp_path / "out")["foot"]
     for body, numbers, into in ((1, range(19, 28), -1.0), (2, range(1, 10), 1.0)):
@@ -95,7 +95,7 @@ def test_worn_faces_come_back_at_the_users_nodes(blocks, tmp_path):
 
 
 def test_cycle_of_another_peak_is_not_taken_from_the_cache(blocks, tmp_path, monkeypatch):
-    """The same cycle, but stiff as at another of its loads."""
+    """The cycle is the same, but its stiffness is taken at another load."""
     forces = []
     for leg, cache in ((4, "one"), (3, "one"), (3, "other")):
         monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / cache))
@@ -108,7 +108,7 @@ def test_cycle_of_another_peak_is_not_taken_from_the_cache(blocks, tmp_path, mon
 
 @pytest.mark.parametrize("stiffness", ["linear", "relinearised"])
 def test_peak_that_does_not_converge_is_told(blocks, stiffness, monkeypatch):
-    """Neither the drift probe nor what a stiffness is taken at may pass for a solution."""
+    """Neither the drift probe nor the state for the stiffness may count as a solution."""
     stage = structure_loads(
         load_case(blocks, [f"nonlinearity.stiffness={stiffness}"]), mesh_assembly
     )
@@ -119,8 +119,7 @@ def test_peak_that_does_not_converge_is_told(blocks, stiffness, monkeypatch):
 
 @pytest.mark.slow
 def test_load_beyond_the_middles_of_coarse_cells_costs_no_run(blocks, tmp_path):
-    """A foot that nearly tips over: nine nodes make 3 x 3 cells, and the grid holds what they do
-    not."""
+    """A foot nearly tips over: nine nodes make 3 x 3 cells, and the grid holds the moments."""
     loads = json.dumps([BLOCKS["loads"][0], BLOCKS["loads"][1] | {"force": ["16 N", 0, 0]}])
     overrides = f"structure.loads={loads}", "friction.coefficient=0.9", "output.figures=true"
     run(blocks, tmp_path / "out", *overrides)
@@ -131,7 +130,7 @@ def test_load_beyond_the_middles_of_coarse_cells_costs_no_run(blocks, tmp_path):
 
 @pytest.mark.parametrize(("factor", "wear"), [(1.0, "at peak load"), (-1.0, "all the time")])
 def test_open_faces_are_told(blocks, tmp_path, factor, wear):
-    """One that is open at the increment that is shown may wear all the same."""
+    """A face that is open at the shown increment may still wear."""
     lift = {"kind": "displacement", "group": "foot_high", "displacement": [0.0, 0.0, -1e-3]}
     supports = json.dumps([*BLOCKS["supports"], {"group": "foot_high", "hold": "xy"}])
     summary = run(
@@ -159,7 +158,7 @@ SECTION = {
 
 @pytest.fixture
 def section(tmp_path):
-    """A pad 8 mm wide with a round foot over a block, in the plane (X, Z), fine where they meet."""
+    """Return a pad 8 mm wide with a round foot over a block, in the plane (X, Z)."""
     with gmsh_model("section") as gmsh:
         occ, sag = gmsh.model.occ, RADIUS - np.sqrt(RADIUS**2 - 16.0)
         corners = [occ.addPoint(x, 0, z) for x, z in ((-8, -8), (8, -8), (8, 0), (-8, 0))]
@@ -189,8 +188,11 @@ def section(tmp_path):
 
 
 def test_round_foot_in_the_plane_presses_as_hertz_says(section, tmp_path):
-    """P per length, and the peak pressure of nodes and strips: bodies 8 mm high are nearly
-    half-spaces to a contact of half-width 1.1 mm, and nodes 0.1 mm apart round its peak off."""
+    """P per length and the peak pressure of nodes and cells are close to Hertz.
+
+    Bodies 8 mm high are nearly half-spaces to a contact of half-width 1.1 mm, and nodes 0.1 mm
+    apart round off its peak.
+    """
     summary = run(section, tmp_path / "out")
     load = 20.0 * 8.0
     assert summary["foot"]["peak_load"]["unworn"]["P"] == pytest.approx(load, rel=1e-6)
@@ -204,7 +206,7 @@ def test_round_foot_in_the_plane_presses_as_hertz_says(section, tmp_path):
 
 @pytest.mark.slow
 def test_nodes_under_a_sliding_foot_wear_to_its_shape(section, tmp_path):
-    """Worn many times deeper than pressed, the block conforms: δ - x²/2R, of volume 2a³/3R."""
+    """Worn much deeper than pressed, the block conforms: δ - x²/2R, of volume 2a³/3R."""
     loads = [
         SECTION["loads"][0] | {"pressure": "10 MPa", "path": [1, 1, 1, 1]},
         {"kind": "displacement", "group": "lid", "displacement": [0.05, 0, 0],
@@ -263,7 +265,7 @@ def test_gap_that_does_not_fit_the_face(blocks, gap, wrong):
 
 
 def test_heights_are_those_of_the_paraboloid(blocks):
-    """Two ways to say the same gap, at the nodes of the face of 1 mm."""
+    """Two descriptions of the same gap agree at the nodes of the face of 1 mm."""
     axis = (np.arange(16) + 0.5) / 16.0 - 0.5
     np.save(blocks.with_name("gap.npy"), np.tile(axis[:, None] ** 2 / 20.0, 16))
     gaps = ("{shape: paraboloid, radius_x: 10}", "{shape: heights, file: gap.npy}")
@@ -276,7 +278,7 @@ def test_heights_are_those_of_the_paraboloid(blocks):
 
 @pytest.mark.slow
 def test_gap_that_the_mesh_cannot_show_costs_no_run(blocks, tmp_path):
-    """A hole under the middle node of the foot, deeper than its elements are large."""
+    """The hole under the middle node of the foot is deeper than its elements are large."""
     gap = np.zeros((16, 16))
     gap[7:9, 7:9] = 0.9
     np.save(blocks.with_name("gap.npy"), gap)
@@ -290,7 +292,7 @@ def test_gap_that_the_mesh_cannot_show_costs_no_run(blocks, tmp_path):
 
 @pytest.mark.parametrize("group", ["cut", slow("edge")])
 def test_supports_on_a_contact_face(tmp_path, group):
-    """On a plane of symmetry the contact is the whole one; a held edge is none, and warned of."""
+    """A plane of symmetry leaves the contact whole; a held edge does not, and is warned of."""
     text = cube("base", 2.0) + cube("foot", 1.0) + ASSEMBLY.replace("0.5, 0.5, 2.", "0.5, 0., 2.")
     for part, first in (("base", 19), ("foot", 1)):
         edge = f"*Nset, nset={part}_edge\n{first}, {first + 1}, {first + 2}\n*End Part"
@@ -309,7 +311,7 @@ def test_supports_on_a_contact_face(tmp_path, group):
 
 
 def test_slice_in_plane_strain_is_refused(blocks):
-    """Its contact would be a narrow strip: the plane says what is meant."""
+    """Its contact would be a narrow strip; the plane model is the right choice."""
     held = [{"group": group, "hold": "y"} for group in ("base_high", "foot_low", "foot_high")]
     supports = json.dumps([*BLOCKS["supports"], *held])
     assert "as in a slice in plane strain" in refused(blocks, f"structure.supports={supports}")

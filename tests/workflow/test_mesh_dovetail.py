@@ -1,4 +1,4 @@
-"""Our own dovetail as a file of another code: the same as built in."""
+"""The dovetail as a mesh file of another code gives the same results as the built-in one."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("reads_here")
 
 
 def write_inp(path: Path, mesh) -> None:
-    """Both bodies in a flat Abaqus file, with element sets and element surfaces."""
+    """Write both bodies to a flat Abaqus file, with element sets and element surfaces."""
     nodes, cells, surfaces = ["*NODE"], [], []
     node, element = 1, 1
     for body in mesh.bodies:
@@ -39,9 +39,9 @@ def write_inp(path: Path, mesh) -> None:
 
 
 def dovetail_as_mesh(folder, dovetail, ending):
-    """The dovetail's own mesh in a file, and the case that describes it.
+    """Write the dovetail's mesh to a file, and the case that describes it.
 
-    Every increment is a leg of its own: the pull follows the square of the speed.
+    Every increment is a separate leg, as the pull follows the square of the speed.
     """
     model = dovetail_joint(dovetail)
     mesh = model.meshed()
@@ -89,7 +89,7 @@ def dovetail_as_mesh(folder, dovetail, ending):
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", [".msh", ".inp"])
 def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkeypatch):
-    """Loads, slips and energies of every increment, to the solver's accuracy."""
+    """Loads, slips and energies of every increment agree to the solver's accuracy."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-11)
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
     dovetail = load_case(small_path)

@@ -1,4 +1,4 @@
-"""Cases of a mesh file: what it names, what it says besides, CAD, and names that are not there."""
+"""Tests of cases of a mesh file: names, other contents, CAD, and missing names."""
 
 import json
 
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.usefixtures("reads_here")
 
 
 def test_what_a_file_says_besides_is_named(blocks, tmp_path):
-    """Loads, supports and contact of the other program, by line; nothing where there is none."""
+    """Loads, supports and contact of the other program are listed by line, if there are any."""
     file = tmp_path / "blocks.inp"
     assert "not taken over" not in invoke("check", blocks).output
     assert "not taken over" not in invoke("describe", file).output
@@ -33,7 +33,7 @@ def test_what_a_file_says_besides_is_named(blocks, tmp_path):
 
 
 def test_a_face_in_two_parts(blocks, tmp_path):
-    """Named both, they are the whole; named one, a check doubts it; twice, or none, is refused."""
+    """Both names give the whole; one alone is warned of; a repeated or missing one is refused."""
     edit(
         tmp_path / "blocks.inp",
         "*Surface, type=ELEMENT, name=foot_low\n1, S1\n2, S1\n3, S1\n4, S1\n",
@@ -53,7 +53,7 @@ def test_a_face_in_two_parts(blocks, tmp_path):
 
 
 def test_a_node_set_may_be_a_face(blocks, tmp_path):
-    """Its facets are those with all their corners in it; one with nodes elsewhere is none."""
+    """Its facets have all their corners in the set; a set with other nodes is no face."""
     surface = "*Surface, type=ELEMENT, name=foot_low\n1, S1\n2, S1\n3, S1\n4, S1\n"
     nodes = "*Nset, nset=foot_low\n1, 2, 3, 4, 5, 6, 7, 8, 9\n"
     whole = run(blocks, tmp_path / "whole")["foot"]
@@ -68,7 +68,7 @@ def test_a_node_set_may_be_a_face(blocks, tmp_path):
 
 
 def test_a_face_that_is_half_named_is_doubted(blocks, tmp_path):
-    """Of the lower cube's top one half: the foot overhangs it."""
+    """Only half of the lower cube's top is named, so the foot overhangs it."""
     edit(
         tmp_path / "blocks.inp",
         "*Surface, type=ELEMENT, name=base_high\n5, S2\n6, S2\n7, S2\n8, S2\n",
@@ -87,7 +87,7 @@ def test_keyword_that_is_not_read_is_refused_with_its_line(blocks):
 
 
 def face_at(imported, body, height, normal):
-    """The boundary of a body at a height that looks along z."""
+    """Return the boundary of a body at a height with a normal along z."""
     for name in imported.bodies[body].mesh.boundaries:
         surface = patch(imported.bodies[body], name)
         if np.allclose(surface.normal, [0, 0, normal]) and np.isclose(surface.centroid[2], height):
@@ -97,7 +97,7 @@ def face_at(imported, body, height, normal):
 
 @pytest.fixture
 def cad(tmp_path):
-    """Boxes of 4 and 2 mm in a STEP file, its faces found by where they are."""
+    """Return boxes of 4 and 2 mm in a STEP file, with their faces found by position."""
     file = tmp_path / "boxes.step"
     with gmsh_model("boxes") as gmsh:
         gmsh.model.occ.addBox(-2, -2, -2, 4, 4, 2)
@@ -161,7 +161,7 @@ def test_size_is_for_cad_files_alone(cad, blocks):
 
 
 def test_node_sets_that_are_no_faces(blocks, tmp_path):
-    """They take forces, which their nodes share, and no pressure; one node takes no moment."""
+    """They accept forces, shared by their nodes, but no pressure; one node accepts no moment."""
     part = "*End Part\n*Assembly"
     tips = "*Nset, nset=tip\n5\n*Nset, nset=top\n19, 21, 25, 27\n"
     edit(blocks.with_name("blocks.inp"), part, f"{tips}{part}")
@@ -178,7 +178,7 @@ def test_node_sets_that_are_no_faces(blocks, tmp_path):
 
 
 def test_node_sets_that_are_faces_take_what_faces_take(blocks, tmp_path):
-    """Pressure and forces on the nodes of a face are those on the face, to all digits."""
+    """Pressure and forces on the nodes of a face equal those on the face, to all digits."""
     high = "*Surface, type=ELEMENT, name=foot_high\n5, S2\n6, S2\n7, S2\n8, S2\n"
     low = "*Surface, type=ELEMENT, name=base_low\n1, S1\n2, S1\n3, S1\n4, S1\n"
     whole = run(blocks, tmp_path / "whole")["foot"]
@@ -205,7 +205,7 @@ def test_node_sets_that_are_faces_take_what_faces_take(blocks, tmp_path):
     ],
 )  # fmt: skip
 def test_names_that_are_not_there(blocks, key, name, wrong):
-    """The line says which names there are."""
+    """The line lists the available names."""
     message = refused(blocks, f"structure.{key}={name}")
     assert message.startswith(f"--set structure.{key}={name}: ")
     assert wrong in message

@@ -1,4 +1,4 @@
-"""Loads of mesh cases beyond forces: temperatures, and motions of points tied to faces."""
+"""Tests of loads of mesh cases other than forces: temperatures, and motions of tied points."""
 
 import json
 
@@ -59,7 +59,7 @@ def sections(out):
 
 @pytest.mark.slow
 def test_bodies_that_expand_alike_are_pressed_across_their_plane(tmp_path):
-    """Free in the plane, they feel nothing of it there; along y it is -E θ, under contacts too."""
+    """They expand freely in the plane; along y the stress is -E θ, under contacts too."""
     cold = run(scene(tmp_path / "cold"), tmp_path / "a", *settings(HELD))
     hot = run(scene(tmp_path / "hot", HEATED), tmp_path / "b", *settings(HELD))
     assert hot["foot"]["depth_1"] == pytest.approx(cold["foot"]["depth_1"], rel=1e-3)
@@ -73,7 +73,7 @@ def test_bodies_that_expand_alike_are_pressed_across_their_plane(tmp_path):
 
 @pytest.fixture
 def heated(tmp_path):
-    """A case with a uniform temperature, and one node by node after it."""
+    """Return a case with a uniform temperature, and one with the same temperature by nodes."""
     path = scene(tmp_path / "case", HEATED)
     imported = load_case(path).structure.read(None)
     numbers = np.concatenate([imported.node_numbers[name] for name in ("base", "foot")])
@@ -89,7 +89,7 @@ def with_loads(*loads):
 
 
 def test_temperatures_of_nodes_that_are_all_alike(heated):
-    """Forces of the structure are those of one temperature for all; a new file is a new load."""
+    """Forces equal those of one temperature for all nodes; a changed file is a new load."""
     supports = settings(HELD)[1]
     models = [
         mesh_assembly(load_case(heated, [supports, with_loads(load)])) for load in (HEATED, NODAL)
@@ -141,7 +141,7 @@ def test_files_of_temperatures_that_do_not_fit_are_refused(heated, text, wrong):
 
 
 def test_numbers_of_nodes_are_those_of_a_mesh_file(template_files):
-    """Of shapes, which a run meshes itself, nobody knows them."""
+    """Shapes that a run meshes itself have no node numbers known to the user."""
     load = json.dumps([NODAL | {"file": "temperatures.csv", "path": [1, 0]}])
     cad = "structure.file=joint.step", "mesh.size=4 mm", f"structure.loads={load}"
     with pytest.raises(CaseError, match=r"structure.loads.0.kind: a CAD file is meshed here"):
@@ -149,7 +149,7 @@ def test_numbers_of_nodes_are_those_of_a_mesh_file(template_files):
 
 
 def test_expansion_is_asked_for_where_it_counts(heated):
-    """Of the heated body alone, and of linear structures."""
+    """Only the heated body needs it, and only in linear structures."""
     cold = f"materials.body_2={json.dumps(STEEL)}"
     assert "materials.body_2.expansion: missing, and a temperature of foot changes" in refused(
         heated, cold
@@ -181,7 +181,7 @@ def first_cycle(path, *loads):
 
 
 def test_rigid_face_that_does_not_turn_is_imposed_a_displacement(blocks):
-    """The same forces as where each of its nodes is moved."""
+    """The forces equal those with each of its nodes moved."""
     aside = {"displacement": ["1 um", 0, 0], "path": [0, 1]}
     tied = first_cycle(blocks, DOWN | {"tie": "rigid"}, DOWN | aside | {"tie": "rigid"})
     moved = [
@@ -200,7 +200,7 @@ def test_rigid_face_that_does_not_turn_is_imposed_a_displacement(blocks):
 
 @pytest.mark.parametrize(("stroke", "slides"), [("0.5 um", 0), ("6 um", 0), ("300 um", 6)])
 def test_half_space_follows_a_point_that_is_moved(blocks, stroke, slides):
-    """With its own friction: it sticks, slips in part or slides, by the energies of the nodes."""
+    """With friction it sticks, slips in part or slides, with the energies of the nodes."""
     down = DOWN | {"at": [0, 0, 3], "displacement": [0, 0, "-80 um"], "path": [1, 1, 1, 1]}
     aside = down | {"displacement": [stroke, 0, 0], "path": [0, 1, -1, 1]}
     history, _, first = solved(
@@ -217,7 +217,7 @@ def test_half_space_follows_a_point_that_is_moved(blocks, stroke, slides):
 
 @pytest.mark.parametrize("tie", ["averaged", "rigid"])
 def test_moment_of_a_force_beside_the_contact(blocks, tie):
-    """100 N/mm, 0.2 mm beside the middle: the contact carries both."""
+    """The contact carries 100 N/mm and its moment, at a distance of 0.2 mm from the middle."""
     load = {"kind": "force", "group": "foot_z1", "force": [0, 0, "-100 N"], "path": [1, 0.5]}
     (history,) = first_cycle(blocks, load | {"at": [0.2, 0, 5], "tie": tie}).histories
     np.testing.assert_allclose(history.loads.P, [100.0, 75.0, 50.0], rtol=1e-6)

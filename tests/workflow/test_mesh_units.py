@@ -1,4 +1,4 @@
-"""A mesh in metres or inches is that in millimetres; one whose unit is forgotten is doubted."""
+"""A mesh in metres or inches gives the results of one in mm; a missing unit is warned of."""
 
 import re
 
@@ -19,7 +19,7 @@ ALONE = "error_budget=known"
 
 
 def divided(path, size):
-    """Write the nodes of an Abaqus file, and where instances are, over a size."""
+    """Write an Abaqus file with the positions of nodes and instances divided by a size."""
     lines, nodes = path.read_text("utf-8").splitlines(), False
     for k, line in enumerate(lines):
         if line.startswith("*"):
@@ -34,7 +34,7 @@ def divided(path, size):
 
 
 def test_a_mesh_in_metres_wears_as_in_millimetres(blocks, tmp_path):
-    """All results, and the worn mesh, which is in mm."""
+    """All results agree, and so does the worn mesh, which is in mm."""
     expected = run(blocks, tmp_path / "mm", ALONE)["foot"]
     divided(tmp_path / "blocks.inp", 1000.0)
     found = run(blocks, tmp_path / "m", METRES, ALONE)["foot"]
@@ -53,7 +53,7 @@ def test_a_mesh_in_metres_wears_as_in_millimetres(blocks, tmp_path):
 
 
 def test_sizes_and_their_unit_are_told(blocks, tmp_path):
-    """By check and by describe: of both bodies, 2 mm wide and 3 mm high."""
+    """Check and describe report both bodies, 2 mm wide and 3 mm high."""
     assert "taken as mm, the file says no unit; bodies within 2 x 2 x 3 mm" in _said(blocks)
     divided(tmp_path / "blocks.inp", 25.4)
     inches = _said(blocks, "--set", "structure.length_unit=in")
@@ -70,7 +70,7 @@ def _said(case, *options):
 
 
 def test_a_forgotten_unit_is_doubted(blocks, tmp_path):
-    """Metres taken as mm: bodies of µm, and 4 N on a millionth of their face."""
+    """Metres read as mm make bodies of µm, with 4 N on a millionth of their face."""
     assert "doubt: " not in _said(blocks)
     divided(tmp_path / "blocks.inp", 1000.0)
     said = _said(blocks)
@@ -109,7 +109,7 @@ def test_what_a_file_in_inches_says_is_offered_in_our_units(tmp_path):
 
 
 def cubes_of_salome():
-    """A column of two cubes of 1 below another cube, which says that it is in metres."""
+    """Return a column of two unit cubes below another, in a file that claims metres."""
     points = [(x, y, z) for z in (0, 1, 2, 2, 3) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     cells = np.array([range(8), range(4, 12), range(12, 20)])
     text = cae_files.universal(np.array(points, dtype=float), {"hexahedron": cells})
@@ -124,7 +124,7 @@ def cubes_of_salome():
 
 
 def test_metres_of_a_universal_file_are_asked_about(tmp_path):
-    """Salome says so of every mesh: a unit in the case settles it."""
+    """Salome writes this unit for every mesh, so the case must state one."""
     (tmp_path / "cubes.unv").write_text(cubes_of_salome(), encoding="utf-8")
     contact = {"name": "pad", "face_1": "low", "face_2": "foot", "x": [1, 0, 0]}
     pressure = {"kind": "pressure", "group": "high", "pressure": "1 MPa", "path": [1, 0]}
@@ -143,7 +143,7 @@ def test_metres_of_a_universal_file_are_asked_about(tmp_path):
 
 
 def test_files_that_are_not_read_are_refused_with_what_to_export(blocks, tmp_path):
-    """And are none of those that are allowed."""
+    """They are not listed among the allowed formats either."""
     for name in ("a.odb", "a.geo", "a.xyz"):
         (tmp_path / name).write_text("", encoding="utf-8")
         wrong, _, allowed = refused(blocks, f"structure.file={name}").partition("; allowed: ")

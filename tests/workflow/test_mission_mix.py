@@ -1,4 +1,4 @@
-"""Missions that take turns: through the structure, from a file, and worn as one."""
+"""Tests of alternating missions: in the structure, from a file, and in wear."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ LOW = "rotation_speed: 4500 rpm, aerodynamic_moment: 20 N*m"
 
 
 def mix(*shares: float, last: str = "") -> str:
-    """A mix of missions that differ in the last."""
+    """Return a mix of missions that differ in the last one."""
     blocks = [f"{{share: {share}}}" for share in shares[:-1]]
     return f"load_path.mix=[{', '.join([*blocks, f'{{share: {shares[-1]}, {last}}}'])}]"
 
@@ -40,7 +40,7 @@ def plane_path(dovetail_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def staged(plane_path):
-    """The structure of the plane dovetail with overrides."""
+    """Return a function for the structure of the plane dovetail with overrides."""
 
     def make(*overrides: str) -> StructureLoads:
         case = load_case(plane_path, [*COARSE, *SHORT, *overrides])
@@ -53,7 +53,7 @@ def staged(plane_path):
 
 @pytest.fixture(scope="module")
 def run(plane_path, tmp_path_factory):
-    """A run of two explicit steps of the plane dovetail with overrides."""
+    """Return a function for a run of two explicit steps of the plane dovetail."""
 
     def go(*overrides: str) -> Run:
         steps = "wear.cycles=2000", "wear.step={kind: explicit, cycles: 1000}"
@@ -71,7 +71,7 @@ def run(plane_path, tmp_path_factory):
 
 
 def test_blocks_of_a_mix_are_the_missions_one_after_the_other(staged):
-    """Each the closed cycle that it would be alone, worn and unworn."""
+    """Each is the closed cycle that it would be alone, worn and unworn."""
     mixed = staged(mix(0.7, 0.3, last=LOW))
     alone = staged(), staged("load_path.rotation_speed=4500 rpm",
                              "load_path.aerodynamic_moment=20 N*m")  # fmt: skip
@@ -100,7 +100,7 @@ def test_peak_load_is_that_of_the_heaviest_mission(staged):
 
 @pytest.mark.parametrize("friction", [0.25, 0.55])
 def test_structural_friction_may_change_with_wear(staged, friction):
-    """As that of a case with this coefficient, and the wedge's closed form at peak load."""
+    """Loads equal those of a case with this coefficient, and the wedge's closed form at peak."""
     stage, other = staged(), staged(f"friction.coefficient={friction}")
     unworn = [np.zeros(len(i)) for i in stage.mesh.interfaces]
     changed = stage.worn(unworn, [friction] * 2)
@@ -118,7 +118,7 @@ def test_structural_friction_may_change_with_wear(staged, friction):
 
 
 def test_flanks_may_differ_in_friction(staged):
-    """The slippery one slides at its own limit; together they carry the pull, Σ P - Qx at 45°."""
+    """The slippery one slides at its limit; together they carry the pull, Σ P - Qx at 45°."""
     stage = staged()
     unworn, t = [np.zeros(len(i)) for i in stage.mesh.interfaces], stage.peak
     both = sum(h.loads.P[t] - h.loads.Qx[t] for h in stage.unworn())
@@ -135,7 +135,7 @@ def test_flanks_may_differ_in_friction(staged):
 
 
 def test_factors_of_a_mix_scale_the_loads_of_a_mesh(template_files):
-    """A rotation's is that of its speed, whose square the forces follow."""
+    """The factor of a rotation applies to its speed, and forces follow the square."""
     path = template_files / "case.yaml"
     turning = "{kind: rotation, axis: [0, 1, 0], through: [0, 0, 0], speed: 10, path: [1, 0]}"
     overrides = [
@@ -244,7 +244,7 @@ def test_hdf5_of_a_mix_reads_back_bit_for_bit(tmp_path, staged):
 
 
 def test_exported_mix_and_laws_are_a_case(plane_path, staged, tmp_path):
-    """`fretscale resultants` takes along both laws, their evolution and the mix."""
+    """`fretscale resultants` exports both laws, their evolution and the mix."""
     entries = [
         *(*COARSE, *SHORT, mix(0.7, 0.3, last=LOW)),
         "wear.disk={law: archard, coefficient: 1e-4, hardness: 3 GPa}",

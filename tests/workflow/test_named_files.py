@@ -1,4 +1,4 @@
-"""What a case names is opened with it: files that cannot be what they are to be are refused."""
+"""Files that a case names are opened with it, and refused if their content is unsuitable."""
 
 import h5py
 import numpy as np
@@ -25,7 +25,7 @@ ageing: {cycles: 1000}
 
 
 def told(path, *overrides):
-    """The only line of a case that is refused."""
+    """Return the only line of a case that is refused."""
     ended = command("check", path, overrides=overrides)
     assert ended.exit_code == 2, ended.output
     (line,) = ended.stderr.splitlines()
@@ -41,7 +41,7 @@ def entries(model):
 
 @pytest.mark.parametrize("kind", kinds())
 def test_every_case_that_a_case_names_is_read_with_it(kind):
-    """By its kind of entry, whichever there may be."""
+    """Any entry that names a case has it read, in any kind of case."""
     for name, field in entries(kinds()[kind]):
         file = entry_of(field)
         if isinstance(file, File) and YAML in file.endings:

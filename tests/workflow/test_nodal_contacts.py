@@ -1,4 +1,4 @@
-"""Finite elements alone: nodes of a structure that wear, against balances and finer meshes."""
+"""Tests of wear at the nodes of a structure alone: balances and finer meshes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ ALPHA, FRICTION, LOAD = 1e-8, 0.4, 1301.33
 
 @dataclass
 class Wearing:
-    """The loop of a case whose nodes wear."""
+    """Wear loop of a case whose nodes wear."""
 
     source: StructureLoads
     contacts: NodalContacts
@@ -50,7 +50,7 @@ class Wearing:
         yield from self.loop.march(state)
 
     def worn(self, state: CoupledState) -> tuple[Array, Array, Array]:
-        """Places along a flank, depth of both bodies there, and pressure at peak load."""
+        """Return places along a flank, depth of both bodies there, and pressure at peak load."""
         stage, face = self.contacts.stages[0], state.interfaces[0]
         x = stage.face.coordinates[:, 0]
         order = np.argsort(x)
@@ -79,7 +79,7 @@ def test_volume_is_energy_and_flanks_wear_alike(coarse) -> None:
 
 
 def test_forces_stay_those_of_the_balance(coarse) -> None:
-    """Also on the cells that are written, which lose no volume either."""
+    """Forces balance also on the cells that are written, which lose no volume."""
     wearing, states = coarse
     state = states[-1]
     tractions = [end.tractions for end in wearing.contacts.ends(state.interfaces)()]
@@ -95,7 +95,7 @@ def test_forces_stay_those_of_the_balance(coarse) -> None:
 
 
 def test_a_cycle_dissipates_as_finely_divided_ones_do() -> None:
-    """Half the slip before a solved state and half after it, or the mean pressure of both ends."""
+    """Slip is assigned half before and half after a solved state, or to the mean pressure."""
 
     def energies(increments: int, peak: int) -> tuple[float, float]:
         wearing = Wearing.of(*COARSE[:2], f"load_path.increments=[{peak}, {increments - peak}]")
@@ -108,12 +108,12 @@ def test_a_cycle_dissipates_as_finely_divided_ones_do() -> None:
     fine = energies(88, 32)[0]
     by_state, by_increment = energies(11, 4)
     assert by_state == pytest.approx(fine, rel=0.015)
-    # Of one flank; the other is its mirror image but for the mesh.
+    # Only one flank, as the other is its mirror image except for the mesh.
     assert by_state == pytest.approx(by_increment, rel=1e-4)
 
 
 def test_a_run_goes_on_from_what_the_disk_keeps(coarse) -> None:
-    """That is all of a state but where its cycle is found; bit for bit."""
+    """The disk has all of a state except the cache of its cycle; results are bitwise equal."""
     _, states = coarse
 
     def kept(face):
@@ -166,7 +166,7 @@ def test_a_chart_ends_with_the_finest_elements_alone() -> None:
 
 @pytest.mark.slow
 def test_elements_alone_converge() -> None:
-    """Depth after 3e5 cycles and inner pressure against twice the nodes and increments."""
+    """Depth after 3e5 cycles and inner pressure agree with twice the nodes and increments."""
     found = []
     for finer in (1, 2):
         wearing = Wearing.of(

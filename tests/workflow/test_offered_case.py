@@ -1,4 +1,4 @@
-"""``fretscale describe --case``: what a file says becomes a case, and what does not is told."""
+"""Tests of ``fretscale describe --case``: a file becomes a case, and ignored parts are listed."""
 
 import json
 
@@ -13,7 +13,7 @@ from workflow.commands.offered_case import TO_FILL
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 
-# As CAE writes what belongs to the blocks of the other tests: 40 MPa, then 4 N to and fro.
+# The model of the blocks of the other tests, as CAE writes it: 40 MPa, then 4 N back and forth.
 SECTION = "*Elset, elset=all, generate\n1, 8, 1\n*Solid Section, elset=all, material=Steel\n,\n"
 MODEL = """\
 *Material, name=Steel
@@ -57,7 +57,7 @@ Foot-1.foot_nodes, 4, 7.
 
 
 def deck(folder, model=MODEL):
-    """A file of both blocks and a model, and its path."""
+    """Write a file of both blocks and a model, and return its path."""
     nodes = "*Nset, nset={}_nodes, generate\n1, 9, 1\n"
     text = "".join(
         cube(name, size).replace("*End Part", nodes.format(name) + SECTION + "*End Part")
@@ -69,7 +69,7 @@ def deck(folder, model=MODEL):
 
 
 def offered(path, *options):
-    """The case that is offered, as data, and the lines that are not in it."""
+    """Return the offered case as data, and the lines that it leaves out."""
     case = path.with_suffix(".yaml")
     ending = invoke("describe", path, "--case", case, *options)
     assert ending.exit_code == 0, ending.stderr
@@ -117,7 +117,7 @@ def test_an_abaqus_model_becomes_a_case(tmp_path):
 
 
 def test_only_what_the_user_knows_is_missing(tmp_path):
-    """A check names it; given, the case is the one written by hand, to all digits."""
+    """A check names it; with it, the case equals the one written by hand, to all digits."""
     path = deck(tmp_path)
     offered(path)
     case = path.with_suffix(".yaml")
@@ -151,7 +151,7 @@ def test_only_what_the_user_knows_is_missing(tmp_path):
 
 
 def test_loads_of_every_kind(tmp_path):
-    """Of steps: what is given stays, op=new ends it; one that turns is a load of its own."""
+    """Loads of a step persist until op=new ends them; a rotating load is a separate one."""
     model = MODEL[: MODEL.index("*Boundary")] + (
         "*Boundary\nBase-1.base_nodes, 1, 3\nFoot-1.foot_high, 2\n"
         "*Step\n*Static\n*Cload\nFoot-1.foot_nodes, 3, -2.\n*Dload\n, GRAV, 9810., 0., 0., -1.\n"
@@ -185,7 +185,7 @@ def test_loads_of_every_kind(tmp_path):
 
 
 def loads_of_steps(folder, *steps):
-    """Loads that are offered of steps, by kind and group, and what is told."""
+    """Return the offered loads of steps, by kind and group, and the messages."""
     model = MODEL[: MODEL.index("*Step")]
     text = "".join(f"*Step\n*Static\n{step}*End Step\n" for step in steps)
     case, ignored = offered(deck(folder, model + text))
@@ -193,7 +193,7 @@ def loads_of_steps(folder, *steps):
 
 
 def test_several_cards_of_a_step_end_the_loads_before_them_once(tmp_path):
-    """As CAE writes them, each with op=NEW: what the first says does not end with the second."""
+    """CAE writes op=NEW on each card; loads of the first card remain after the second."""
     high, low = "Foot-1.foot_high", "Foot-1.foot_low"
     loads, _ = loads_of_steps(
         tmp_path,
@@ -206,7 +206,7 @@ def test_several_cards_of_a_step_end_the_loads_before_them_once(tmp_path):
 
 
 def test_loads_of_nothing_end_those_before_them(tmp_path):
-    """A face that is moved goes back where a later step says zero; it is held by nothing new."""
+    """A moved face returns where a later step says zero; nothing new holds it."""
     high, nodes = "Foot-1.foot_high", "Foot-1.foot_nodes"
     loads, ignored = loads_of_steps(
         tmp_path,
@@ -222,7 +222,7 @@ def test_loads_of_nothing_end_those_before_them(tmp_path):
 
 
 def test_friction_that_a_file_does_not_give_is_asked_for(tmp_path):
-    """A contact without friction has none in Abaqus: the one of another contact is not its own."""
+    """A contact without friction in Abaqus has none; that of another contact does not apply."""
     pair = "*Contact Pair, interaction=dry, type=SURFACE TO SURFACE\n"
     smooth = "*Surface Interaction, name=smooth\n1.,\n*Contact Pair, interaction=smooth\n"
     faces = "Foot-1.foot_cut, Base-1.base_cut\n"
@@ -277,7 +277,7 @@ def test_what_is_not_taken_is_told(tmp_path, old, new, told):
 
 
 def test_a_thickness_is_told(tmp_path):
-    """Forces of the file are those on it, and of a case on a millimetre."""
+    """Forces of the file are for its thickness, those of a case for a millimetre."""
     path = deck(tmp_path)
     path.write_text(path.read_text("utf-8").replace("Steel\n,\n", "Steel\n2.5,\n", 1), "utf-8")
     case, ignored = offered(path)
@@ -286,7 +286,7 @@ def test_a_thickness_is_told(tmp_path):
 
 
 def test_files_that_say_nothing_leave_more_to_fill_in(tmp_path):
-    """Of CAD there are faces that lie on each other; what is held and loaded is asked for."""
+    """CAD gives touching faces; supports and loads have to be added."""
     path = tmp_path / "boxes.step"
     with gmsh_model("boxes") as gmsh:
         gmsh.model.occ.addBox(-2, -2, -2, 4, 4, 2)

@@ -1,4 +1,4 @@
-"""Bodies of a mesh file of which one hangs over the end of the other: they touch where both are."""
+"""Tests of bodies of a mesh file, one of which overhangs the other's end."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Matrices as the structure of a rig: beside the same rig built in, and what is refused."""
+"""Tests of matrices as the structure of a rig: the built-in rig as reference, and refusals."""
 
 from pathlib import Path
 
@@ -48,7 +48,7 @@ ROWS = "point,direction\nblock,x\nholder,x\n"
 
 @pytest.fixture
 def two(tmp_path) -> Path:
-    """A folder with the two masses of the lumped rig, and a load on the first of them."""
+    """Return a folder with the two masses of the lumped rig, and a load on the first of them."""
     np.savez(tmp_path / "two.npz", K=STIFF, M=MASS, F=np.array([[1.0], [0.0]]))
     (tmp_path / "unknowns.csv").write_text(ROWS, encoding="utf-8")
     return tmp_path
@@ -60,7 +60,7 @@ def rig_of(folder: Path, *overrides: str, text: str = OWN):
 
 
 def told(folder: Path, *overrides: str, text: str = OWN) -> str:
-    """The line that refuses a case."""
+    """Return the line that refuses a case."""
     with pytest.raises(CaseError) as refusal:
         parse_case(text, str(folder / "case.yaml"), overrides)
     (line,) = str(refusal.value).splitlines()
@@ -72,7 +72,7 @@ def told(folder: Path, *overrides: str, text: str = OWN) -> str:
 
 
 def test_two_masses_answer_as_the_rig_that_is_built_in(two):
-    """A Jenkins joint by harmonic balance; the force by points, and by a load."""
+    """A Jenkins joint by harmonic balance, with the force given by points and by a load."""
     lumped = run(two / "lumped", RIG)["responses"][0]
     assert lumped["energy_per_cycle"] > 0.0
     for ways in ((), ("structure.driven={load: 1}",)):
@@ -82,7 +82,7 @@ def test_two_masses_answer_as_the_rig_that_is_built_in(two):
 
 
 def test_units_are_those_of_the_files(two):
-    """K in kN/m, M in t, with rows the other way round: the same rig."""
+    """K in kN/m, M in t and reversed rows give the same rig."""
     np.savez(two / "two.npz", K=STIFF[::-1, ::-1], M=MASS[::-1, ::-1])
     (two / "unknowns.csv").write_text("point,direction\nholder,x\nblock,x\n", encoding="utf-8")
     rig = rig_of(two, IN_METRES)
@@ -103,7 +103,7 @@ def test_damping_comes_to_that_of_the_modes(two):
 
 
 def test_what_a_specimens_run_leaves_is_read_as_matrices(two):
-    """``reduced`` and ``matrices`` of one file: the same rig, its modes as modes."""
+    """``reduced`` and ``matrices`` of one file give the same rig, with its modes as modes."""
     from fe_models.joints.reduction import save_reduced
 
     save_reduced(two / "body.h5", TWO_MASSES)
@@ -157,7 +157,7 @@ def test_exported_bodies_come_back_in_every_format(tmp_path, monkeypatch):
 
 
 def row_of(two: Path, count: int) -> str:
-    """A row of so many masses, fixed at one end, as sparse matrices in two files."""
+    """Write a row of ``count`` masses, fixed at one end, as sparse matrices in two files."""
     diagonals = [-np.ones(count - 1), 2.0 * np.ones(count), -np.ones(count - 1)]
     sp.save_npz(two / "k.npz", 1e5 * sp.diags(diagonals, [-1, 0, 1], format="csr"))
     sp.save_npz(two / "m.npz", 1e-6 * sp.identity(count, format="csr"))
@@ -198,7 +198,7 @@ SHAKEN = "excitation={{forces: [{{points: {}, amplitude: 1}}]}}"
 
 @pytest.mark.parametrize("retained", [(), ("structure.retained=[block]", "structure.modes=0")])
 def test_places_are_known_before_large_matrices_are_reduced(two, monkeypatch, retained):
-    """Of those too that a check does not reduce: they are stood for by their names."""
+    """Even places that a check does not reduce are known by their names."""
     if retained:
         monkeypatch.setattr(matrix_body, "SMALL", 1)
     driven = ("forces=", "structure.driven=", *retained)
@@ -231,7 +231,7 @@ def test_points_without_mass_follow_the_others_and_are_told(two):
 
 
 def test_a_joint_on_a_point_without_mass_is_in_series_with_its_spring(two):
-    """Jenkins' 10 N/µm behind 30 N/µm to the holder is one of 7.5 N/µm on it."""
+    """Jenkins' 10 N/µm in series with 30 N/µm to the holder equals 7.5 N/µm on the holder."""
     K = np.pad(STIFF, (0, 1)) + 30e3 * np.outer([0, -1, 1], [0, -1, 1])
     np.savez(two / "two.npz", K=K, M=np.pad(MASS, (0, 1)))
     (two / "unknowns.csv").write_text(f"{ROWS}tip,x\n", encoding="utf-8")
@@ -312,7 +312,7 @@ def test_wrong_entries_are_refused(two, override, words):
 
 
 def test_matrices_by_other_names_are_offered(two):
-    """A damping D, which would be none without a word, and loads where they are asked for."""
+    """Such as a damping D, which would be ignored silently, and loads where they are needed."""
     given = {"K": STIFF, "M": MASS, "D": 1e-4 * STIFF, "B": np.eye(2)[:, :1], "shapes": np.eye(3)}
     scipy.io.savemat(two / "plant.mat", {**given, "title": "two masses"})
     file = "structure.matrices.file=plant.mat"

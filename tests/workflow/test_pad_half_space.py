@@ -1,4 +1,4 @@
-"""The half-space of rig specimens alone, on a pad of nodes in rows and columns."""
+"""Tests of the half-space of rig specimens alone, on a pad of nodes in rows and columns."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_form_given_as_depth_is_the_same_as_height(face):
 
 
 def test_tied_square(face):
-    """A rigid square punch is as stiff as a square plate holds charge: k = π C E*.
+    """The stiffness of a rigid square punch follows from a plate's capacitance: k = π C E*.
 
     C = 0.36679 sides: Read 1997, J. Comput. Phys. 133, 1.
     """

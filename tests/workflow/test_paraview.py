@@ -1,4 +1,4 @@
-"""ParaView files: read back, at the right place, with the right values and times."""
+"""ParaView files are read back with the right places, values and times."""
 
 import re
 import xml.etree.ElementTree as ElementTree
@@ -40,13 +40,13 @@ def grid_and_frame(file: h5py.File, name: str) -> tuple[Grid, Frame]:
 
 
 def local_centres(grid: Grid) -> Array:
-    """Cell centres in the interface frame, ``(nx, ny, 3)``."""
+    """Return cell centres in the interface frame, ``(nx, ny, 3)``."""
     x, y = np.broadcast_arrays(grid.x, grid.y)
     return np.stack([x, y, np.zeros(grid.shape)], axis=-1)
 
 
 def on_flank(grid: Grid) -> tuple[Array, Array]:
-    """Which rows and columns of the grid lie on the flank."""
+    """Return which rows and columns of the grid lie on the flank."""
     on_x, on_y = (
         np.abs(axis.ravel()) <= size / 2 for axis, size in zip((grid.x, grid.y), SIZE, strict=True)
     )
@@ -54,7 +54,7 @@ def on_flank(grid: Grid) -> tuple[Array, Array]:
 
 
 def flank(folder: Path, name: str, jump: str) -> tuple[pv.PolyData, tuple[int, int]]:
-    """A flank, and how many points it has along x and y."""
+    """Return a flank, and how many points it has along x and y."""
     mesh = pv.read(folder / name / f"{jump}.vtp")
     (columns,) = np.unique(mesh.points @ np.array([0.0, 1.0, 0.0])).shape
     return mesh, (mesh.n_points // columns, columns)
@@ -175,7 +175,7 @@ def test_structure_is_unworn_then_worn(results: Path, folder: Path) -> None:
 
 
 def worn_volume(surface: pv.PolyData, frame: Frame) -> float:
-    """Volume between a surface and the nominal plane, counted along the frame's z [mm³]."""
+    """Return the volume between a surface and the nominal plane, along the frame's z [mm³]."""
     corners = frame.coordinates(np.array(surface.points, dtype=float))
     a, b, c = np.moveaxis(corners[surface.regular_faces], 1, 0)
     areas = 0.5 * np.cross(b - a, c - a)[:, 2]
@@ -220,7 +220,7 @@ def test_worn_surfaces_face_each_other(
 
 
 def header(path: Path) -> ElementTree.Element:
-    """The XML of a file before its raw appended data."""
+    """Return the XML of a file before its raw appended data."""
     text = path.read_bytes().split(b"<AppendedData")[0]
     return ElementTree.fromstring(text + b"</VTKFile>")
 
@@ -254,7 +254,7 @@ def test_first_file_is_the_script(folder: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("count", "peak"), [(1, 0), (22, 8), (48, 47), (49, 1), (1000, 613)])
 def test_increments_that_are_shown(count: int, peak: int) -> None:
-    """All of them, or as many as are shown at most from first to last; peak load among them."""
+    """All are shown, or at most some from first to last, including the peak load."""
     shown = shown_increments(count, peak)
     assert len(set(shown)) == len(shown) == min(count, MOST_INCREMENTS)
     assert peak in shown

@@ -1,4 +1,4 @@
-"""Main results that every analysis names: numbers, in units that are those of its datasets."""
+"""Main results of every analysis exist as numbers, in the units of its datasets."""
 
 import json
 from pathlib import Path
@@ -48,7 +48,7 @@ QUICK = "contact", "vibration"
 
 
 def run(folder: Path, text: str, *overrides: str) -> Path:
-    """The folder of a finished run."""
+    """Return the folder of a finished run."""
     files = {"case.yaml": text, "loads.csv": ROLLER_LOADS, "specimens.yaml": SPECIMENS}
     for name, content in files.items():
         (folder / name).write_text(content, encoding="utf-8")
@@ -59,7 +59,7 @@ def run(folder: Path, text: str, *overrides: str) -> Path:
 
 
 def units_of(results: Path) -> dict[str, set[str]]:
-    """Units of all datasets of a file, by the last part of their names."""
+    """Return units of all datasets of a file, by the last part of their names."""
     units: dict[str, set[str]] = {}
 
     def collect(name: str, item: object) -> None:
@@ -108,7 +108,7 @@ def test_analyses_are_called_as_their_cases_do():
 
 
 def test_loads_tell_their_ends_and_increments():
-    """Nothing acts along x at the increment of the largest P, where results are told."""
+    """Nothing acts along x at the increment of the largest P, where results are reported."""
     zero, sliding = np.zeros(4), np.zeros(4, dtype=bool)
     force, across = np.array([4e3, 3e3, 3e3, 3e3]), np.array([0.0, -1e3, 0.0, 500.0])
     ranges = load_ranges(LoadHistory(force, across, *[zero] * 6, sliding))

@@ -1,4 +1,4 @@
-"""A reduced body as a rig: its points by name, and joints, masses and springs at them."""
+"""Tests of a reduced body as a rig: named points, and joints, masses and springs at them."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -84,7 +84,7 @@ AS_A_BODY = RIG.replace(next(line for line in RIG.splitlines(True) if "kind: rig
 
 @pytest.fixture(scope="module")
 def coarsest(tmp_path_factory) -> Iterator[Path]:
-    """A case of specimens with 9 points of the pad and 4 of the ring, and a cache of its own."""
+    """Return a case of specimens with 9 pad points and 4 ring points, and a separate cache."""
     folder = tmp_path_factory.mktemp("specimens")
     path = folder / "specimens.yaml"
     path.write_text(dump_case(load_case(CASES / "specimens_coarse.yaml", COARSE)), encoding="utf-8")
@@ -95,13 +95,13 @@ def coarsest(tmp_path_factory) -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def body(coarsest) -> ReducedModel:
-    """Its upper specimen."""
+    """Return its upper specimen."""
     return SpecimensModel(load_case(coarsest)).reduction.models[1]
 
 
 @pytest.fixture
 def specimen(body, tmp_path) -> Path:
-    """A folder with the body."""
+    """Return a folder with the body."""
     save_reduced(tmp_path / "body_2.h5", body)
     return tmp_path
 
@@ -113,7 +113,7 @@ def two_masses(tmp_path) -> Path:
 
 
 def rig_of(folder: Path, *overrides: str, text: str = SPECIMEN):
-    """The rig of a case and its joints."""
+    """Return the rig of a case and its joints."""
     case = parse_case(text, str(folder / "case.yaml"), overrides)
     mass = getattr(case, "mass", None)
     rig = rig_model(case.structure, case.joint, mass, Reporter(folder / "run.log"))
@@ -121,7 +121,7 @@ def rig_of(folder: Path, *overrides: str, text: str = SPECIMEN):
 
 
 def row(rig: RigModel, kind: str, axis: str) -> np.ndarray:
-    """Mean displacement of points of one kind."""
+    """Return the mean displacement of points of one kind."""
     chosen = [name.startswith(f"{kind} ") and name.endswith(f" {axis}") for name in rig.model.names]
     return np.array(chosen) / sum(chosen)
 
@@ -149,7 +149,7 @@ def test_names_and_places_are_stored(body, specimen):
 
 
 def test_a_case_of_specimens_is_reduced_first(coarsest, specimen, body):
-    """The same rig as from the file of its run, the second time from the cache."""
+    """The rig equals that from the file of its run; the second time it comes from the cache."""
     setting = f"structure.file={coarsest}"
     rigs = [rig_of(specimen, *given)[0] for given in ((), (setting, "structure.body=2"))]
     for name in ("mass", "damping", "stiffness", "connection"):
@@ -161,7 +161,7 @@ def test_a_case_of_specimens_is_reduced_first(coarsest, specimen, body):
 
 
 def test_directions_and_shares(specimen):
-    """A friction contact under the body closes as it moves down; shares are even."""
+    """A friction contact under the body closes as it moves down; shares are equal."""
     rig, joint = rig_of(specimen)
     assert (rig.joints, rig.directions) == (PAD, 3)
     down = -row(rig, "pad", "z") * PAD
@@ -218,9 +218,9 @@ def test_one_jenkins_joint_is_the_lumped_rig(two_masses):
 
 
 def test_a_stuck_body_is_linear(specimen, body):
-    """Frequencies and the amplitude at 400 Hz, from matrices put together here.
+    """Frequencies and the amplitude at 400 Hz agree with matrices assembled here.
 
-    The amplitude is off by what the step leaves of the period, as in the lumped rig.
+    The amplitude has the error of the step in the period, as in the lumped rig.
     """
     state = run(specimen, SPECIMEN, "joint.friction=10", "excitation.steady=1e-8")["states"][0]
     axis = np.array(["xyz".find(name[-1]) for name in body.names])
@@ -272,7 +272,7 @@ def test_a_preload_is_balanced_at_rest(specimen):
 
 
 def test_a_gap_closes(specimen):
-    """Pushed down within half a second, next to statically, onto springs kn from 10 µm on."""
+    """It is pushed down slowly within half a second onto springs kn, from 10 µm on."""
     gap = "joint={law: friction_contact, normal_load: 0, gap: 10 um, friction: 0.5, "
     rig, joint = rig_of(specimen, gap + "stiffness: 20 N/um, normal_stiffness: 30 N/um}",
                         "structure.driven={points: pad, direction: -z}")  # fmt: skip
@@ -341,7 +341,7 @@ def test_points_that_are_not_there_are_refused(specimen, override, words):
 
 
 def test_points_of_specimens_are_known_before_they_are_meshed():
-    """Their number is that of the case: nine by nine nodes of the pad, eight of the ring."""
+    """Their number follows from the case: nine by nine pad nodes, eight ring nodes."""
     case = str(CASES / "rig_reduced.yaml")
     with pytest.raises(
         CaseError, match=r"no such point; allowed: pad, pad 1 to pad 81, ring, .* 8"

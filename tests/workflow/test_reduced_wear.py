@@ -1,4 +1,4 @@
-"""A body of own matrices that wears its contacts: closed forms, balances, a whole run, refusals."""
+"""Tests of a body of own matrices that wears its contacts: closed forms, balances, a run."""
 
 import csv
 import json
@@ -76,7 +76,7 @@ continuation: {longest_step: 0.4}
 
 
 def matrices():
-    """Stiffness, mass, names and places: the holder, and pads below it that hold each other."""
+    """Return stiffness, mass, names and places: the holder, and coupled pads below it."""
     points = ["holder", *(f"pad {k + 1}" for k in range(NODES))]
     grid = PITCH * np.array([(i, j, 0) for i in range(SIDE) for j in range(SIDE)], dtype=float)
     places = np.vstack([[PITCH, PITCH, 10.0], grid]) + np.array([100.0, 20.0, 5.0])
@@ -108,7 +108,7 @@ NODES_FILE = "point,area [mm^2],gap [um]\n" + ROWS
 
 
 def as_texts():
-    """The same in text: matrices, and unknowns with their places."""
+    """Return the same as text: matrices, and unknowns with their places."""
     K, M, names, places = matrices()
     head = f"%%MatrixMarket matrix array real general\n{len(K)} {len(K)}\n"
     texts = {"k.mtx": K, "m.mtx": M}
@@ -202,7 +202,7 @@ def point(tmp_path_factory):
 
 
 def dissipated(load):
-    """A cycle's energy of a slider along one line under a constant load, by another law."""
+    """Return a cycle's energy of a slider along one line at constant load, by another law."""
     rig = lumped_rig({"p": MASS}, {Link("p"): SPRINGS[0]}, [[Link("p")]], damping_ratio=0.02)
     law = PeriodicMarch(Jenkins(KT, 0.5, max(load, 0.0)))
     sine = PeriodicLoad({1: -1j * unit_force(rig, "p")})
@@ -212,9 +212,10 @@ def dissipated(load):
 
 
 def depth_after(cycles):
-    """dw/dn = α e(N0 - K w) / A, both springs in series: its load follows from the depth.
+    """Integrate dw/dn = α e(N0 - K w) / A, with both springs in series.
 
-    e(N) from loads at Chebyshev's points, smooth as long as all slides.
+    The load follows from the depth; e(N) is interpolated at Chebyshev's points, as it is smooth
+    while everything slides.
     """
     energy = Chebyshev.interpolate(lambda loads: [*map(dissipated, loads)], 10, (LEAST, PRESSED))
 
@@ -228,7 +229,7 @@ CYCLES, LEAST = 6e5, 15.0
 
 
 def test_a_point_that_a_spring_presses_wears_as_its_equation_says(point):
-    """Steps converge with their square; what they tell is within a factor of 2 of the truth."""
+    """Steps converge with their square; their reported error is right within a factor of 2."""
     exact = depth_after(CYCLES)
     # A third of the load is gone.
     assert 0.3 < SERIES * exact / PRESSED < 1.0 - LEAST / PRESSED
@@ -251,7 +252,7 @@ def test_a_point_that_a_spring_presses_wears_as_its_equation_says(point):
 
 
 def test_volume_energy_and_work_balance(pads):
-    """V = α ΣE of either body; the force's work is what joints and damping take, as the samples."""
+    """V = α ΣE for either body; the force's work is lost in joints and damping."""
     state = advance_cycles(HeunStepper(0.1), pads.begin(), 1e6, 1e6, pads.contact_at).state
     cycle = pads.at(state)
     volumes = [float(depth @ cycle.areas) for depth in state.surfaces.depths]
@@ -270,9 +271,9 @@ def test_volume_energy_and_work_balance(pads):
 
 
 def test_a_load_on_the_contacts_is_that_on_what_presses_them(folder, tmp_path):
-    """Even areas, no gaps: pressed through the body or by each contact, rest and wear are one.
+    """With equal areas and no gaps, pressing the body or each contact gives the same.
 
-    The pads being alike but for their neighbours, springs between them carry nothing.
+    As the pads are equal except for their neighbours, springs between them carry nothing.
     """
     for place in ("body.npz", "nodes.csv"):
         (tmp_path / place).write_bytes((folder / place).read_bytes())
@@ -290,7 +291,7 @@ def test_a_load_on_the_contacts_is_that_on_what_presses_them(folder, tmp_path):
 
 
 def test_a_stored_reduced_body_wears_as_its_matrices(pads, folder):
-    """The other kind of structure, with places that its file has."""
+    """The other kind of structure has its places in its file."""
     save_reduced(folder / "body.h5", on_all(own_matrices({}, folder / "body.npz")))
     own = case_of(folder)
     kept = ("joints", "damping_ratio", "driven", "seen")
@@ -316,9 +317,9 @@ def test_nothing_wears_where_one_body_is_given_none(pads):
 
 
 def test_wear_alike_everywhere_lowers_the_body_and_nothing_else(pads):
-    """Also where all contacts of the motion that one begins with are open on the worn body.
+    """All contacts of the starting motion may even be open on the worn body.
 
-    Newton's method then leads bodies apart so far that rounding hid that nothing balances the load.
+    Newton's method then moved the bodies so far apart that rounding hid the unbalanced load.
     """
     begun = pads.at(pads.begin())
     deep = 1.1 * float(begun.motion.coefficients[:, 0, 2].max())

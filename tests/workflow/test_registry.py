@@ -1,4 +1,4 @@
-"""A new analysis, or a new structure that wears its contacts, needs one edit outside its own files.
+"""A new analysis, or a new structure that wears, needs one edit outside its own files.
 
 Both are made here and registered by one line each; the command line then knows them.
 """
@@ -39,7 +39,7 @@ Force = Annotated[float, Quantity("N", above=0.0, at_most=1e6)]
 
 
 def done(*arguments: object) -> str:
-    """What a command says that succeeds."""
+    """Return the output of a command that succeeds."""
     result = invoke(*arguments)
     assert result.exit_code == 0, result.stderr
     return result.stdout
@@ -49,7 +49,7 @@ def done(*arguments: object) -> str:
 
 
 class Ball(Section):
-    """A sphere on a plane of the same material."""
+    """Sphere on a plane of the same material."""
 
     kind: Literal["ball"] = entry("what is pressed", "ball")
     radius: Length = entry("of the sphere [mm]", "10 mm")
@@ -57,7 +57,7 @@ class Ball(Section):
 
 
 class HertzCase(Case):
-    """A ball pressed on a plane."""
+    """Ball pressed on a plane."""
 
     about: ClassVar[str] = "a ball pressed on a plane"
 
@@ -70,7 +70,7 @@ class HertzCase(Case):
 
 
 def run_hertz(run: Run[HertzCase]) -> None:
-    """Radius of the contact [mm], Johnson (1985), Contact Mechanics, eq. 4.22."""
+    """Compute the radius of the contact [mm], Johnson (1985), Contact Mechanics, eq. 4.22."""
     case = run.case
     run.reporter.say(f"run: {case.title}")
     combined = case.structure.modulus / 2.0
@@ -95,7 +95,7 @@ RADIUS = 0.0075 ** (1.0 / 3.0)
 
 @pytest.fixture
 def ball(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """The analysis registered, and a new case of it."""
+    """Register the analysis, and return a new case of it."""
     monkeypatch.setattr(kinds, "ANALYSES", {**kinds.ANALYSES, "hertz": "hertz"})
     monkeypatch.setitem(sys.modules, "workflow.analyses.hertz", SimpleNamespace(ANALYSIS=HERTZ))
     path = tmp_path / "ball.yaml"
@@ -165,14 +165,14 @@ def test_new_analysis_has_no_structure_to_take_loads_from(ball: Path, tmp_path: 
     assert "no structure to take loads from" in refused.stderr
 
 
-# --- a structure: a rounded stamp driven to and fro by a machine that nothing holds up -----------
+# --- a structure: a rounded stamp moved back and forth by a machine without resistance ------------
 
 HALF_WIDTH = 1.0
 INCREMENTS = 4
 
 
 class Stamp(Section):
-    """A stamp pressed by a constant force, whose foot is moved to and fro."""
+    """Stamp pressed by a constant force, whose foot is moved back and forth."""
 
     kind: Literal["stamp"] = entry("what the structure is", "stamp")
     radius: Length = entry("of its foot [mm]", "100 mm")
@@ -181,7 +181,7 @@ class Stamp(Section):
 
 
 class StampCase(WearCase):
-    """A stamp that wears with what it stands on."""
+    """Stamp that wears together with its support."""
 
     about: ClassVar[str] = "a stamp that wears with what it stands on"
 
@@ -195,7 +195,7 @@ class StampCase(WearCase):
 
 @dataclass(frozen=True)
 class Sliding:
-    """What the foot carries over a cycle: ``slip`` ``(t, 2, n)`` [mm]; it does not deform."""
+    """Loads of the rigid foot over a cycle: ``slip`` ``(t, 2, n)`` [mm]."""
 
     loads: LoadHistory
     slip: Array
@@ -204,12 +204,12 @@ class Sliding:
 
 
 def rounded(radius: float, x: Array, y: Array) -> Array:
-    """Gap [mm] of a foot of this radius."""
+    """Return the gap [mm] of a foot of this radius."""
     return (x**2 + y**2) / (2.0 * radius)
 
 
 class StampLoads:
-    """Loads of gross sliding in closed form, whatever the wear."""
+    """Loads of gross sliding in closed form, independent of wear."""
 
     line = False
     peak = 0
@@ -228,7 +228,7 @@ class StampLoads:
         return (ContactFace(face, size, gap, (8, 8)),)
 
     def prepare(self) -> None:
-        """Nothing is costly."""
+        """Do nothing, since nothing is costly."""
 
     def unworn(self) -> tuple[Sliding, ...]:
         stamp, friction = self._case.structure, self._case.friction.coefficient
@@ -269,7 +269,7 @@ SMALL = (
 
 @pytest.fixture
 def stamp(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """The structure registered, and a new case of it."""
+    """Register the structure, and return a new case of it."""
     monkeypatch.setattr(structures, "STRUCTURES", (*structures.STRUCTURES, STAMP))
     monkeypatch.setitem(wear.ANALYSIS.cases, STAMP.name, STAMP.case)
     path = tmp_path / "stamp.yaml"
@@ -285,7 +285,7 @@ def test_new_structure_is_written_and_checked(stamp: Path) -> None:
 
 
 def test_new_structure_wears_its_contact(stamp: Path, tmp_path: Path) -> None:
-    """Where both bodies wear by dissipated energy, the volumes are coefficient times energy."""
+    """Both bodies wear by dissipated energy, so volume is coefficient times energy."""
     out = tmp_path / "out"
     settings = [part for override in SMALL for part in ("--set", override)]
     done("run", stamp, "--out", out, *settings)

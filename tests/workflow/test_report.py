@@ -1,4 +1,4 @@
-"""The page of a finished run: all that it tells, for itself alone, whatever is in the case."""
+"""Tests of the report of a finished run: complete, self-contained, and safe for any case."""
 
 import base64
 import json
@@ -46,7 +46,7 @@ VOID = {"meta", "img", "wbr"}
 
 
 class Page(HTMLParser):
-    """A page as it is read: elements that close, texts by the heading above, links, and images."""
+    """Parser of a report: closed elements, texts by their heading, links, and images."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -79,7 +79,7 @@ class Page(HTMLParser):
 
 
 def run(folder: Path, *overrides: str) -> Path:
-    """The folder of a finished run of the case."""
+    """Return the folder of a finished run of the case."""
     folder.mkdir(exist_ok=True)
     (folder / "case.yaml").write_text(CASE, encoding="utf-8")
     settings = [part for entry in overrides for part in ("--set", entry)]
@@ -90,7 +90,7 @@ def run(folder: Path, *overrides: str) -> Path:
 
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
-    """A run with figures of two formats."""
+    """Return a run with figures of two formats."""
     folder = tmp_path_factory.mktemp("drawn")
     return run(folder, "output.paraview=false", "output.figures=[svg, pdf]")
 

@@ -1,4 +1,4 @@
-"""Loads of another code: the case that reads them, the run under them, and ours given away."""
+"""Tests of loads of another code: the case that reads them, its run, and exported loads."""
 
 import csv
 import json
@@ -60,7 +60,7 @@ QUIET = [
 
 
 def run(case: Path, out: Path, *overrides: str) -> dict[str, Any]:
-    """The summary of a run that must end well."""
+    """Return the summary of a run that must succeed."""
     done = command("run", case, "--out", out, "--force", overrides=[*QUIET, *overrides])
     assert done.exit_code == 0, done.stderr
     summary: dict[str, Any] = json.loads((out / "summary.json").read_text("utf-8"))
@@ -68,7 +68,7 @@ def run(case: Path, out: Path, *overrides: str) -> dict[str, Any]:
 
 
 def write_nodes(path: Path, x: Array, y: Array) -> Path:
-    """A table of nodes at ``x`` and ``y`` of the face in ``FRAME``, numbered from 100."""
+    """Write a table of nodes at ``x`` and ``y`` of the face in ``FRAME``, numbered from 100."""
     local = np.stack([axis.ravel() for axis in np.meshgrid(x, y)], axis=1)
     points = [15, 0, 245] + local[:, :1] * [-1, 0, 1] / np.sqrt(2) + local[:, 1:] * [0, 1, 0]
     rows = [f"{100 + n}, {X!r}, {Y!r}, {Z!r}" for n, (X, Y, Z) in enumerate(points.tolist())]
@@ -78,7 +78,7 @@ def write_nodes(path: Path, x: Array, y: Array) -> Path:
 
 @pytest.fixture
 def written(tmp_path: Path) -> Path:
-    """The template beside a table."""
+    """Write the template and a table in its folder."""
     (tmp_path / "loads.csv").write_text(TABLE, encoding="utf-8")
     path = tmp_path / "case.yaml"
     path.write_text(template("resultants"), encoding="utf-8")
@@ -104,14 +104,14 @@ def test_template_is_a_case(written):
 
 
 def uncommented(line: str) -> str:
-    """The line without the signs before its key."""
+    """Return the line without the comment signs before its key."""
     while line.lstrip().startswith("# "):
         line = line.replace("# ", "", 1)
     return line
 
 
 def test_template_works_without_its_comment_signs(tmp_path):
-    """Entries about single interfaces, their frames and nodes are right as well."""
+    """Entries about single interfaces, their frames and nodes are valid as well."""
     one = [line for line in TABLE.splitlines() if not line.startswith(("late", "never"))]
     text = "\n".join(one).replace("early", "interface")
     (tmp_path / "loads.csv").write_text(text, encoding="utf-8")
@@ -241,7 +241,7 @@ def test_heights_are_their_own_on_their_grid_and_bilinear_elsewhere(line):
 
 @pytest.fixture(scope="module")
 def typed(tmp_path_factory) -> tuple[Path, dict[str, Any]]:
-    """A run under the table: its folder and summary, not to be changed."""
+    """Return folder and summary of a run under the table, which tests must not change."""
     folder = tmp_path_factory.mktemp("typed")
     (folder / "loads.csv").write_text(TABLE, encoding="utf-8")
     (folder / "case.yaml").write_text(template("resultants"), encoding="utf-8")
@@ -260,7 +260,7 @@ def typed(tmp_path_factory) -> tuple[Path, dict[str, Any]]:
 
 
 def test_table_wears_as_its_energy_says(typed):
-    """Equilibrium with the loads of the table, and worn volume = coefficient x energy."""
+    """Loads are those of the table, and worn volume = coefficient x energy."""
     folder, summary = typed
     coefficient = 1e-8  # 1e4 µm³/J in 1/MPa
     for name, load in {"early": 5e4, "late": 0.0, "never": 0.0}.items():
@@ -304,7 +304,7 @@ def test_worn_surface_goes_back_to_the_nodes(typed):
 
 
 def displacements(path: Path) -> Array:
-    """Rows ``(n, 3)`` of a table of displacements."""
+    """Return the rows ``(n, 3)`` of a table of displacements."""
     with path.open(newline="", encoding="utf-8") as stream:
         header, *rows = csv.reader(stream)
     assert header == ["node", "ux [mm]", "uy [mm]", "uz [mm]"]
@@ -329,7 +329,7 @@ def test_a_new_run_takes_away_the_nodes_of_the_old(typed, tmp_path):
 
 
 def test_a_table_without_moments_holds_the_tilt(tmp_path):
-    """On heights that do not lie level; a table of the moments that hold it presses alike."""
+    """Heights are not level; a table of the moments that hold the tilt presses equally."""
     x = (np.arange(64) - 31.5) * 3.0 / 64
     np.save(tmp_path / "gap.npy", (0.03 * x**4 + 0.01 * x)[:, None])
     rows = [line.split(", ") for line in LINE_TABLE.splitlines()]
@@ -364,7 +364,7 @@ def test_a_table_without_moments_holds_the_tilt(tmp_path):
 
 @pytest.mark.slow
 def test_pictures_of_resultants_alone(typed, tmp_path):
-    """Figures leave out what another code did not tell; ParaView shows every face."""
+    """Figures leave out what another code does not provide; ParaView shows every face."""
     results = typed[0] / "results.h5"
     told = ANALYSIS.pictures, contents_of(typed[0]), results
     figures = {path.stem for path in write_figures(*told, tmp_path / "figures")}
@@ -429,7 +429,7 @@ def test_loads_that_do_not_close_are_warned_of(tmp_path, closure, told):
 
 @pytest.mark.slow
 def test_our_table_is_read_by_a_case(small_path, written):
-    """The CSV alone, over the flank as a nominal face."""
+    """The CSV alone suffices, over the flank as a nominal face."""
     folder = written.parent / "ours"
     settings = ["contact.grid=[16, 24]", *QUIET]
     done = command("resultants", small_path, "--out", folder, overrides=settings)

@@ -1,4 +1,4 @@
-"""Loads as files: what is read is what was written, whatever its units, columns and signs."""
+"""Loads as files are read as they were written, whatever their units, columns and signs."""
 
 import re
 from dataclasses import replace
@@ -106,14 +106,14 @@ def test_nodal_forces_that_are_not_those_of_the_loads_are_refused(tmp_path, name
 
 
 def marched_cycle(history: InterfaceHistory) -> CycleSolution:
-    """The last of 13 cycles, which has not closed."""
+    """Return the last of 13 cycles, which has not closed."""
     return CycleSolution(
         (history,), (), history.displacement[-1], 1, 1e-9, True, 3.5e-3, np.zeros(7), 13
     )
 
 
 def test_how_well_a_cycle_is_closed_is_told_and_read_back(tmp_path):
-    """By either file, each interface for itself; files of other codes need not say."""
+    """Both kinds of file have it for each interface; files of other codes may omit it."""
     history = face_history()
     cycle, table, fields = marched_cycle(history), tmp_path / "loads.csv", tmp_path / "loads.h5"
     write_resultants_csv(table, {"f": history.loads}, cycle=cycle)
@@ -141,7 +141,7 @@ def test_a_closure_that_is_none_is_refused(tmp_path, written):
 
 
 def test_slip_on_the_grid_is_the_same_bit_for_bit(tmp_path):
-    """What wear is computed from: slip on the cells, before writing and after reading."""
+    """The slip on the cells, from which wear is computed, is the same after reading."""
     history, grid = face_history(), Grid.covering(SIZE, (32, 64))
     write_resultants_h5(tmp_path / "loads.h5", {"f": history})
     imported = read_resultants(tmp_path / "loads.h5")["f"]
@@ -151,7 +151,7 @@ def test_slip_on_the_grid_is_the_same_bit_for_bit(tmp_path):
 
 
 def test_results_of_a_run_are_read_from_their_group(tmp_path):
-    """``results.h5:structure`` holds what a run wrote of its structure."""
+    """``results.h5:structure`` holds the structure's results of a run."""
     history, path = face_history(), tmp_path / "results.h5"
     with writing(path) as writer:
         put_face(writer, "structure/intrados", history.interface, history)
@@ -162,7 +162,7 @@ def test_results_of_a_run_are_read_from_their_group(tmp_path):
 
 
 def test_loads_of_a_run_pass_all_checks(whole, tmp_path):
-    """Our own structure contradicts itself nowhere, and its loads survive the way through a CSV."""
+    """Our structure's loads pass all checks, also after export to a CSV."""
     with h5py.File(whole.folder / "results.h5") as file:
         friction, grids = file.attrs["friction"], file["grid"]
         sizes = {n: tuple(g.attrs["shape"] * g.attrs["pitch"]) for n, g in grids.items()}
@@ -199,7 +199,7 @@ def test_units_of_a_line_contact_are_per_length(tmp_path):
 
 
 def test_without_moments_the_tilt_is_held(tmp_path):
-    """Both of them, or in a line contact that about its length; in either kind of file."""
+    """Both are missing, or in a line contact the one about its length; in either kind of file."""
     two = {name: value for name, value in GOOD.items() if name not in ("Mx", "My")}
     one = {"P": 100, "Qx": -40, "Edx": 2}
     for row, line in ((two, False), (one, True), (one | {"Mx": 0}, True)):
@@ -255,7 +255,7 @@ def test_interfaces_may_alternate_and_comments_stand_anywhere(tmp_path):
 
 
 def test_sliding_is_deduced_by_the_share_of_the_contact_solver(tmp_path):
-    """At 99 % of µP and with energy lost; in a file that says so, as it says."""
+    """Sliding means 99 % of µP and lost energy, unless the file states it."""
     shears, energies = (-40, -39.7, -39.5, 40, 0), (2, 2, 2, 0, 0)
     rows = [GOOD | {"Qx": q, "Edx": e} for q, e in zip(shears, energies, strict=True)]
     path = write(tmp_path, table(rows))
@@ -271,7 +271,7 @@ def test_sliding_is_deduced_by_the_share_of_the_contact_solver(tmp_path):
 
 
 def snippet() -> dict:
-    """The Python of the recipe, run."""
+    """Run the Python code of the recipe and return its names."""
     (code,) = re.findall(r"```python\n(.*?)```", RECIPE.read_text(encoding="utf-8"), re.DOTALL)
     names: dict = {}
     exec(code, names)
@@ -279,7 +279,7 @@ def snippet() -> dict:
 
 
 def test_snippet_of_the_recipe_gives_our_resultants():
-    """Point forces in global axes, their moment about the global origin: as our own structure."""
+    """Point forces in global axes with the moment about the origin match our structure."""
     names, rng = snippet(), np.random.default_rng(0)
     frame = Frame(names["origin"], names["axes"])
     np.testing.assert_allclose(frame.axes @ frame.axes.T, np.eye(3), atol=1e-15)
@@ -295,7 +295,7 @@ def test_snippet_of_the_recipe_gives_our_resultants():
 
 
 def test_signs_as_the_recipe_tells_them():
-    """Pressure at x > 0 and y > 0, body 2 sliding along +x."""
+    """The pressure is at x > 0 and y > 0, and body 2 slides along +x."""
     names = snippet()
     frame = Frame(names["origin"], names["axes"])
     point = frame.origin + frame.to_global(np.array([2.0, 3.0, 0.0]))

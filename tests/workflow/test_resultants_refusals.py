@@ -1,4 +1,4 @@
-"""Files of contact loads that are refused, each at its place."""
+"""Files of contact loads that are refused, each with the place of its error."""
 
 import re
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ from workflow.case.input_files import InputFileError
 
 @dataclass(frozen=True)
 class Wrong:
-    """A row of three that differs from GOOD in some columns, and the error about it."""
+    """Row of three that differs from GOOD in some columns, and the error about it."""
 
     row: int
     changes: dict[str, object]
@@ -82,7 +82,7 @@ def test_a_wrong_value_is_refused_at_its_line(tmp_path, wrong):
 
 
 def test_what_is_within_rounding_is_taken(tmp_path):
-    """Limits met to four digits, and the remainders of an iterative solver where bodies part."""
+    """Limits may be met to four digits, with remainders of an iterative solver at parting."""
     at_limit = GOOD | {"Qx": 40.03, "My": 500.3, "Edy": -1e-9, "Edx": 2}
     apart = {name: 1e-6 * GOOD[name] for name in COLUMNS} | {"P": 0}
     path = write(tmp_path, table([at_limit, apart | {"Edy": 0}]))
@@ -149,7 +149,7 @@ def test_a_line_contact_has_no_moment_about_x(tmp_path):
 
 
 def spoil(file: h5py.File, name: str, values: object) -> None:
-    """Put a dataset in the place of another one."""
+    """Replace a dataset."""
     if name in file:
         del file[name]
     file[name] = values
@@ -246,7 +246,7 @@ def test_facets_are_made_where_none_are_given(tmp_path):
 
 
 def test_slivers_of_printed_coordinates_are_no_elements():
-    """An edge that is straight but for its sixth digit belongs to the elements inside alone."""
+    """An edge that is straight up to its sixth digit belongs only to the elements inside."""
     x, y = np.meshgrid(np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 7), indexing="ij")
     wavy = np.stack([x.ravel(), y.ravel()], 1)
     wavy += 1e-6 * np.random.default_rng(0).standard_normal(wavy.shape)

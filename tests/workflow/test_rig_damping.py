@@ -1,4 +1,4 @@
-"""Damping of rigs as cases give it: linear systems by their matrices, and mistakes."""
+"""Tests of the damping of rigs in cases: linear systems by their matrices, and errors."""
 
 import numpy as np
 import pytest
@@ -15,13 +15,13 @@ DASHPOTS = "[{points: m2, against: m1, coefficient: 200 N*s/m}, {points: m1, coe
 
 
 def of_modes(*ratios):
-    """C of these damping ratios."""
+    """Return C for these damping ratios."""
     squares, shapes = sl.eigh(STIFF, MASS)
     return MASS @ shapes @ np.diag(2.0 * np.array(ratios) * np.sqrt(squares)) @ shapes.T @ MASS
 
 
 def rayleigh():
-    """α and β by 2 ζ = α / ω + β ω."""
+    """Return α and β from 2 ζ = α / ω + β ω."""
     angular = 2.0 * np.pi * np.array([30.0, 500.0])
     alpha, beta = np.linalg.solve(np.stack([1.0 / angular, angular], 1), [0.04, 0.1])
     return alpha * MASS + beta * STIFF
@@ -60,7 +60,7 @@ def test_linear_rigs_are_damped_as_their_matrices(tmp_path, entries, damping, lo
 
 
 def test_dashpots_damp_in_time(tmp_path):
-    """A stuck rig settles on the amplitude of its matrices."""
+    """A stuck rig settles at the amplitude of its matrices."""
     given = f"structure.damping.dashpots={DASHPOTS}"
     summary = run(tmp_path, RIG_IN_TIME, STUCK, given, "integration.step=25 us")
     angular = 2.0 * np.pi * 80.0

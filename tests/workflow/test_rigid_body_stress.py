@@ -1,4 +1,4 @@
-"""Stress under a contact with a rigid body: that of the elastic one, against Hertz, and shown."""
+"""Tests of stress under a contact with a rigid body: that of the elastic body, and pictures."""
 
 import json
 from pathlib import Path
@@ -30,9 +30,9 @@ MOST_SHEARED = {"sphere": (0.310, 0.48), "cylinder": (0.300, 0.786)}
     [("sphere", 2), ("cylinder", 1), slow("sphere", 1), slow("cylinder", 2)],
 )
 def test_the_elastic_body_is_stressed_as_hertz_says(tmp_path: Path, shape: str, rigid: int) -> None:
-    """On the axis, under pressure alone, from 0.05 to two contact radii below the surface.
+    """The stress on the axis under pressure agrees from 0.05 to two contact radii of depth.
 
-    Cells of a/16 leave 1 % of p0.
+    Cells of a/16 have an error of 1 % of p0.
     """
     kind = "bodies_wear" if shape == "sphere" else "line_wear"
     hertz = SPHERE if shape == "sphere" else CYLINDER
@@ -75,7 +75,7 @@ def test_the_elastic_body_is_stressed_as_hertz_says(tmp_path: Path, shape: str, 
 
 
 def _shown(folder: Path, elastic: str) -> None:
-    """Figures and files for ParaView leave the rigid body out, and name it."""
+    """Assert that figures and files for ParaView leave the rigid body out, and name it."""
     contents = contents_of(folder)
     with h5py.File(folder / "results.h5") as file:
         figure = figures_of(contents)["subsurface_stress"](file)

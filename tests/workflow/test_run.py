@@ -1,4 +1,4 @@
-"""Runs of the small case: what they leave, what they conserve, and how odd cases end."""
+"""Tests of runs of the small case: files, conserved quantities, and unusual endings."""
 
 import re
 from functools import partial
@@ -27,7 +27,7 @@ QUICK = (*("load_path.increments=[2, 3]", "contact.grid=[16, 24]"),)
 
 
 def balances(run, laws):
-    """Volume from surfaces = volume of the kinetics = coefficient x energy, per body."""
+    """Assert volume of surfaces = volume of kinetics = coefficient x energy, for each body."""
     with h5py.File(run.folder / "results.h5") as file:
         for name in file["grid"]:
             surfaces, kinetics = file["surfaces"][name], file["kinetics"][name]
@@ -53,7 +53,7 @@ def balances(run, laws):
 
 
 def test_largest_stresses_are_told_with_place_and_error(whole):
-    """As in the results; in notches the largest principal stress is tension along the surface."""
+    """They equal the results; the largest principal stress in notches is along the surface."""
     told = whole.summary["structure"]["peak_stress"]
     with h5py.File(whole.folder / "results.h5") as file:
         for moment, bodies in told.items():
@@ -112,7 +112,7 @@ def test_volumes_heights_and_energies_agree(whole):
 
 
 def test_worn_mesh_holds_the_worn_volume(whole):
-    """The grid's wear is moved to the mesh with its volume; the discrete move loses 1e-4."""
+    """The wear of the grid moves the mesh by its volume; discretisation loses 1e-4."""
     for name in ("intrados", "extrados"):
         flank = whole.summary[name]
         for body in (1, 2):
@@ -120,7 +120,7 @@ def test_worn_mesh_holds_the_worn_volume(whole):
 
 
 def test_written_bodies_are_as_far_apart_as_their_surfaces(whole):
-    """The blade has its rounded edges and ends, the disk is flat; worn, both lie deeper."""
+    """The blade has its rounded edges and ends, the disk is flat; both move back by wear."""
     structure = load_case(whole.folder / "case.yaml").structure
     worn_bodies = read_bodies(whole.folder / "worn.msh").bodies
     with h5py.File(whole.folder / "results.h5") as file:
@@ -144,7 +144,7 @@ def test_written_bodies_are_as_far_apart_as_their_surfaces(whole):
 
 
 def arc(along, radius):
-    """Height of a circle so far along its tangent [mm]."""
+    """Return the height of a circle at a distance along its tangent [mm]."""
     return radius - np.sqrt(radius**2 - np.maximum(along, 0.0) ** 2)
 
 
@@ -169,7 +169,7 @@ def test_explicit_run_with_a_law_for_each_body_and_its_overrides_on_record(start
 
 
 def test_a_contact_in_a_process_of_its_own_is_the_same(tmp_path, request):
-    """But for rounding: an interpreter with fewer libraries may take another way to add up."""
+    """Results agree up to rounding, as a process with fewer libraries may sum differently."""
     (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     (tmp_path / "case.yaml").write_text(ROLLER_WEAR, encoding="utf-8")
     here = Run(invoke("run", tmp_path / "case.yaml", "--out", tmp_path / "here"), tmp_path / "here")
@@ -188,7 +188,7 @@ def test_a_contact_in_a_process_of_its_own_is_the_same(tmp_path, request):
 
 
 def test_a_jump_tells_its_increments_and_how_many_the_last_one_took(tmp_path, monkeypatch):
-    """Those of the half-space's own friction, of which the first cycle takes two passes or one."""
+    """With the half-space's own friction the first cycle takes one or two passes."""
     (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     (tmp_path / "case.yaml").write_text(ROLLER_WEAR, encoding="utf-8")
     told = {}
@@ -255,7 +255,7 @@ def test_jumps_that_add_up_leave_no_jump_of_rounding(start, tmp_path):
 
 @pytest.mark.slow
 def test_step_and_stop_by_depth(start, tmp_path):
-    """No jump wears much more than the step; the last ones are cut to end at the stop."""
+    """No jump wears much more than the step; the last ones are shortened to end at the stop."""
     small, stop = 0.1e-3, 0.35e-3
     run = start(
         tmp_path / "out",
@@ -385,7 +385,7 @@ def test_blade_without_airfoil_pulls_by_its_own_mass(start, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("moment", ["1000 N*m", "3000 N*m"])
 def test_moment_that_opens_a_flank_ends_well(start, tmp_path, moment):
-    """Either a result, or one line that says why there is none."""
+    """It gives either a result, or one line that explains why there is none."""
     run = start(
         tmp_path / "out", f"load_path.aerodynamic_moment={moment}", "wear.cycles=1e4", *QUICK
     )

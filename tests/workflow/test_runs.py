@@ -1,4 +1,4 @@
-"""Many runs in folders: done once, taken up again, none stopped by another."""
+"""Many runs in folders are computed once, resumed, and independent of each other's failures."""
 
 import json
 import os
@@ -52,7 +52,7 @@ def wear(tmp_path):
 
 @pytest.fixture
 def here():
-    """Jobs are run by the test."""
+    """Run jobs in the process of the test."""
     with jobs_here():
         yield
 
@@ -62,7 +62,7 @@ def without_times(summary):
 
 
 def wait_until(condition):
-    """What the condition gives once it holds: asked again, it may hold no longer."""
+    """Return the first true value of the condition, which may not hold later."""
     end = time.monotonic() + PATIENCE
     while not (met := condition()) and time.monotonic() < end:
         time.sleep(0.02)
@@ -172,7 +172,7 @@ def test_a_run_takes_a_core_for_each_of_its_contacts(dovetail_path, contact, wea
 
 
 def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
-    """Never more in use than there are, and all used where jobs allow it."""
+    """Never are more cores in use than exist, and all are used where jobs allow it."""
     import workflow.runs.jobs as runs
 
     wants, used, most = {"a": 2, "b": 1, "c": 1, "d": 3, "e": 9}, [], []
@@ -214,7 +214,7 @@ def start(*arguments):
 
 
 def below(pid):
-    """Processes below one, the job and its contact workers."""
+    """Return the processes below one: the job and its contact workers."""
     processes = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -234,7 +234,7 @@ def alive(pid):
 
 
 def waits(pid):
-    """Whether it is a job that runs ``WAIT``."""
+    """Return whether it is a job that runs ``WAIT``."""
     try:
         return WAIT.encode() in Path(f"/proc/{pid}/cmdline").read_bytes()
     except OSError:
@@ -252,7 +252,7 @@ time.sleep(600)
 @posix_only
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_a_job_ends_with_whoever_waits_for_it(contact, tmp_path):
-    """However that one ends."""
+    """The job ends however the waiting process ends."""
     code = f"from workflow.runs import job\njob.COMMAND = {WAIT!r}\n{RUN}"
     process = subprocess.Popen([sys.executable, "-c", code, contact, tmp_path / "out"])
     # Libraries start short processes of their own while they are imported.
@@ -266,7 +266,7 @@ def test_a_job_ends_with_whoever_waits_for_it(contact, tmp_path):
 @posix_only
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_whoever_is_killed_leaves_a_run_to_take_up(wear, tmp_path):
-    """Ctrl-C, then kill, then to the end: equal to a run that nobody touched, nothing left over."""
+    """After Ctrl-C and a kill, the completed run equals an undisturbed one, without leftovers."""
     out = tmp_path / "out"
     reached = 0
     for stop in (signal.SIGINT, signal.SIGKILL):
@@ -302,7 +302,7 @@ def test_a_damaged_state_is_started_again(wear, here, tmp_path):
 
 
 def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, here, tmp_path):
-    """What fidelity chose is in the folder's case; its record says so."""
+    """The folder's case has the settings chosen by fidelity, and its record lists them."""
     job = Job("one", wear)
     (done,) = run_jobs([job], tmp_path / "out")
     folder = OutputFolder(done.folder)
@@ -347,7 +347,7 @@ def test_a_scheduler_that_is_killed_is_one_line(contact, tmp_path, caplog):
 
 @pytest.fixture
 def impatient(monkeypatch):
-    """Seconds in place of minutes and hours."""
+    """Use seconds instead of minutes and hours."""
     from workflow.runs import cluster
 
     for name, seconds in {"WORKERS_LOOK": 0.1, "TELL": 0.5, "TELL_AGAIN": 60, "GIVE_UP": 3}.items():
@@ -356,7 +356,7 @@ def impatient(monkeypatch):
 
 @pytest.mark.slow
 def test_the_first_worker_may_come_late(contact, tmp_path, impatient, caplog):
-    """Later than those who have gone are waited for: a queue may be long."""
+    """The wait for it is longer than that for lost workers, since a queue may be long."""
     distributed = pytest.importorskip("distributed")
     options = {"n_workers": 0, "processes": False, "dashboard_address": None}
     with distributed.LocalCluster(**options) as cluster:
@@ -374,7 +374,7 @@ def test_the_first_worker_may_come_late(contact, tmp_path, impatient, caplog):
 @pytest.mark.slow
 @posix_only
 def test_workers_that_have_all_gone_are_told_and_given_up(wear, tmp_path, impatient, caplog):
-    """What they have kept is there to go on from."""
+    """Their stored states remain, so that runs can be resumed."""
     distributed = pytest.importorskip("distributed")
     out = tmp_path / "out"
     options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
@@ -410,7 +410,7 @@ def test_a_cluster_finds_what_local_processes_find(contact, tmp_path):
 @posix_only
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_a_worker_killed_at_work_changes_nothing(contact, wear, tmp_path):
-    """Two worker processes, one killed: all runs end, bit for bit as local processes find them."""
+    """One of two workers is killed; all runs end with the bits of local processes."""
     distributed = pytest.importorskip("distributed")
     coefficients = [f"wear.body_1.coefficient={value} um^3/J" for value in (5e3, 1e4, 2e4)]
     jobs = [
@@ -440,7 +440,7 @@ def test_a_worker_killed_at_work_changes_nothing(contact, wear, tmp_path):
 
 
 def kill_at_work(workers, folder):
-    """Kill the worker below which the job of the folder runs, when it has done some jumps."""
+    """Kill the worker that runs the job of the folder, after some jumps."""
     wait_until((folder / "jumps/00005.h5").exists)
     for worker in workers:
         commands = [Path(f"/proc/{pid}/cmdline").read_text() for pid in below(worker)]
@@ -451,7 +451,7 @@ def kill_at_work(workers, folder):
 
 
 def surfaces(folder):
-    """Both surfaces of all jumps, ``(jumps, 2, nx)``."""
+    """Return both surfaces of all jumps, ``(jumps, 2, nx)``."""
     with h5py.File(folder / "results.h5") as file:
         jumps = file["surfaces/interface"].values()
         return np.array([[jump[f"body_{body}"][()] for body in (1, 2)] for jump in jumps])

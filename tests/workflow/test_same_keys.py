@@ -1,4 +1,4 @@
-"""The same thing is said in the same way in every analysis."""
+"""The same thing has the same name in every analysis."""
 
 import pytest
 

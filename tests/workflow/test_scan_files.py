@@ -1,4 +1,4 @@
-"""Measured surfaces: read from every kind of file, refused with their place, and in a contact."""
+"""Measured surfaces are read from every kind of file, refused with a place, and used in contact."""
 
 import builtins
 import re
@@ -26,7 +26,7 @@ BARE = {"unit": "um", "pitch": PITCH}
 
 @pytest.fixture(scope="module")
 def scan():
-    """Roughness of 0.3 µm about 5 µm, of which a few points are missing."""
+    """Return roughness of 0.3 µm about 5 µm, with a few missing points."""
     heights = 5e-3 + 3e-4 * np.random.default_rng(0).normal(size=(40, 30))
     heights[3, 4] = heights[-1, -1] = np.nan
     return Scan(heights, PITCH)
@@ -34,7 +34,7 @@ def scan():
 
 @pytest.mark.parametrize("ending", WRITTEN)
 def test_profilometer_files_come_back(scan, ending, tmp_path):
-    """Those that the library writes, by it and by us: heights and pitch to 1e-6."""
+    """Formats that the library writes are read by it and by us: heights and pitch to 1e-6."""
     import surfalize
 
     paths = [tmp_path / f"theirs{ending}", tmp_path / f"ours{ending}"]
@@ -62,7 +62,7 @@ def corpus(folder, name, content):
 
 @pytest.mark.parametrize("name", [*scan_corpus.BINARY, *scan_corpus.TEXT, *scan_corpus.BARE])
 def test_what_instruments_write_has_its_heights_and_pitch(name, tmp_path):
-    """Of each format that is offered, packed from its description: to rounding in 4 bytes."""
+    """Each supported format, packed from its description, is read to 4-byte rounding."""
     content, unit, pitch = scan_corpus.BARE.get(name, (None, None, None))
     if content is None:
         content = {**scan_corpus.BINARY, **scan_corpus.TEXT}[name]
@@ -153,7 +153,7 @@ def test_what_is_no_scan_is_told_with_its_place(name, content, bare, words, tmp_
 
 
 def test_a_file_under_another_name_is_not_guessed(scan, tmp_path):
-    """The library would read it by the first of its readers that makes numbers of it."""
+    """The library would use the first of its readers that finds numbers."""
     write_scan(tmp_path / "s.x3p", scan)
     (tmp_path / "s.x3p").rename(tmp_path / "s.al3d")
     with pytest.raises(InputFileError, match="of another kind than its name says"):
@@ -187,7 +187,7 @@ def rough_ball(folder, surfaces, shape="shape: sphere, radius: 10 mm"):
 
 @pytest.fixture
 def both(tmp_path):
-    """Points that are the grid's own, of both bodies, levelled already; and the folder."""
+    """Return levelled points of both bodies on the grid itself, and the folder."""
     rng, grid = np.random.default_rng(4), Grid.covering((1.0, 1.0), (16, 16))
     heights = [1e-4 * rng.normal(size=grid.shape) for _ in range(2)]
     for number, each in enumerate(heights, start=1):
@@ -205,7 +205,7 @@ def test_points_that_only_a_probe_of_atoms_resolves_are_a_doubt(tmp_path):
 
 
 def test_a_gap_from_files_is_the_same_as_one_that_is_made(both):
-    """Of scans that lie on the cells: heights of either body close the gap, the upper's turned."""
+    """Scans lie on the cells: heights of either body close the gap; the upper's are turned."""
     folder, grid, first, second = both
     case = rough_ball(
         folder, "{body_1: {file: 1.x3p, level: none}, body_2: {file: 2.x3p, level: none}}"
@@ -249,7 +249,7 @@ def test_cases_refuse_scans_that_do_not_fit(both, surfaces, words):
 
 
 def test_a_contact_that_wears_takes_means_over_any_grid(both):
-    """Of the grid it is given: coarser ones, to choose by, have the means of their own cells."""
+    """Coarser grids, used for choices, have the means over their own cells."""
     folder, _, first, _ = both
     (folder / "wear.yaml").write_text(template("bodies_wear"), encoding="utf-8")
     overrides = [

@@ -1,4 +1,4 @@
-"""Measured surfaces on the faces of meshes and of loads from files: beside the same form given."""
+"""Tests of measured surfaces on mesh faces and file loads, compared with the given form."""
 
 import json
 
@@ -24,7 +24,7 @@ BARE = {"unit": "mm", "level": "none"}
 
 
 def with_surfaces(path, **surfaces):
-    """The case in a file with measured surfaces of its only contact in the place of a gap."""
+    """Return the case with measured surfaces instead of a gap in its only contact."""
     case = YAML(typ="safe").load(path.read_text("utf-8"))
     (contact,) = case["structure"]["contacts"]
     contact.pop("gap", None)
@@ -35,10 +35,10 @@ def with_surfaces(path, **surfaces):
 
 
 def test_a_form_from_scans_is_the_form(tmp_path):
-    """A cylinder, part of it on either body and beside the middle: half-space and nodes alike.
+    """A cylinder, partly on either body and off-centre, agrees in half-space and nodes.
 
-    Nodes have the straight lines next to the arc where they had its points, 4e-5 mm apart; a node's
-    force at the edge of the contact, whose place that moves, is 5e-4 of the largest off.
+    Nodes have the straight lines next to the arc where they had its points, 4e-5 mm apart; the
+    force of a node at the edge of the contact, which this moves, is off by 5e-4 of the largest.
     """
     path = PLANE.press(tmp_path, 1.0, 50.0)
     nodes, _, given = solved(path)
@@ -66,7 +66,7 @@ def test_a_form_from_scans_is_the_form(tmp_path):
 
 @pytest.fixture
 def blocks(tmp_path):
-    """A cube of 1 mm on one of 2 mm, and scans of 1.2 mm: a plane, and waves of 0.2 mm."""
+    """Return a cube of 1 mm on one of 2 mm, and scans of 1.2 mm: a plane, and waves of 0.2 mm."""
     x, y = np.meshgrid(*2 * [(np.arange(120) + 0.5) / 100 - 0.6], indexing="ij")
     np.save(tmp_path / "plane.npy", 1e-3 * x - 2e-3 * y)
     np.save(tmp_path / "waves.npy", 1e-3 * np.sin(2 * np.pi * x / 0.2))
@@ -77,7 +77,7 @@ SCAN = {**BARE, "pitch": [0.01, 0.01]}
 
 
 def test_planes_are_exact_on_nodes_and_cells(blocks):
-    """Of either body, seen from its own side, and from the other where it is flipped."""
+    """Planes of either body are seen from its own side, or from the other if flipped."""
     for body, flipped, sign in ((1, False, 1), (2, False, -1), (2, True, 1), (1, True, -1)):
         scan = {"file": "plane.npy", "flipped": flipped, **SCAN}
         case = load_case(with_surfaces(blocks, **{f"body_{body}": scan}))
@@ -96,7 +96,7 @@ def test_planes_are_exact_on_nodes_and_cells(blocks):
 
 
 def test_what_the_nodes_do_not_follow_is_told(blocks):
-    """Waves of a fifth of the face, over elements of a half of it."""
+    """Waves are a fifth of the face long, elements a half."""
     case = load_case(with_surfaces(blocks, body_1={"file": "waves.npy", **SCAN}))
     (face,) = case.scanned()
     # Their mean over the face is that of the waves, which is none.
@@ -126,7 +126,7 @@ def test_scans_that_do_not_fit_a_face_are_refused(blocks):
 
 
 def test_a_scan_on_flat_bodies_is_pressed_as_a_cylinder(tmp_path):
-    """Hertz's peak, but for the 1.03 % by which these bodies are no half-planes: so the form given.
+    """The peak exceeds Hertz's by 1.03 %, as with the form given: bodies are no half-planes.
 
     Elements are two thirds of the half-width of the contact.
     """
@@ -142,7 +142,7 @@ def test_a_scan_on_flat_bodies_is_pressed_as_a_cylinder(tmp_path):
 
 
 def test_half_a_face_takes_scans_that_are_their_own_image(tmp_path):
-    """Its nodes have what they have on the whole; others are refused."""
+    """Its nodes have the values of the whole; other scans are refused."""
     x = (np.arange(150) + 0.5) * 0.4 - 30.0
     np.save(tmp_path / "arc.npy", -(x[:, None] ** 2) / (2.0 * RADIUS))
     np.save(tmp_path / "slope.npy", 1e-3 * x[:, None])
@@ -164,7 +164,7 @@ def test_half_a_face_takes_scans_that_are_their_own_image(tmp_path):
 
 @pytest.mark.slow
 def test_a_run_keeps_what_was_measured(blocks, tmp_path):
-    """Pressed flat blocks that wear: the unworn lower surface is the scan, and so is the gap."""
+    """For flat wearing blocks, the unworn lower surface is the scan, and so is the gap."""
     with_surfaces(blocks, body_1={"file": "waves.npy", **SCAN})
     summary = run(blocks, tmp_path / "out")
     told = summary["surfaces"]["foot"]["body_1"]
@@ -183,7 +183,7 @@ def test_a_run_keeps_what_was_measured(blocks, tmp_path):
 
 
 def test_loads_from_a_file_take_them_too(tmp_path):
-    """All of the form from a scan, without a gap, and per interface: means over the cells."""
+    """The form comes from a scan alone, without a gap, per interface: means over the cells."""
     (tmp_path / "loads.csv").write_text(
         "P [N],Qx [N],Qy [N],Mz [N*mm],Edx [mJ],Edy [mJ]\n100,0,0,0,0,0\n100,5,0,0,0,0\n",
         encoding="utf-8",

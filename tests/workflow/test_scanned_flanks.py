@@ -1,4 +1,4 @@
-"""Measured surfaces on the flanks of the dovetail: forms given otherwise, balance, symmetry."""
+"""Tests of measured surfaces on the flanks of the dovetail: forms, balance, symmetry."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ FLANKS = {"intrados": 1, "extrados": -1}
 
 
 def solved(path, *changes):
-    """Loads of both flanks, and the first cycle of their contacts."""
+    """Return loads of both flanks, and the first cycle of their contacts."""
     case = load_case(path, list(changes))
     source = structure_of(case).source(case)
     pairs = zip(source.unworn(), source.faces, strict=True)
@@ -33,17 +33,17 @@ def surfaces(**flanks):
 
 
 def scan(folder, name, heights, pitch):
-    """The entry of heights [mm] in a file."""
+    """Write heights [mm] to a file and return its entry."""
     np.save(folder / f"{name}.npy", heights)
     return {**BARE, "file": str(folder / f"{name}.npy"), "pitch": list(pitch)}
 
 
 @pytest.mark.slow
 def test_edges_from_scans_are_the_edges(tmp_path):
-    """Their arcs as profiles, part of them on either body: balance, and the rate of the pressure.
+    """Arcs are given as profiles, partly on either body; balance and pressure converge.
 
-    F = 2 P (sin θ + µ cos θ) is that of the case. Strips carry means of the arc, not its middles,
-    beside the flat's end in first order of their width.
+    F = 2 P (sin θ + µ cos θ) is that of the case. Cells carry means of the arc, not its middles,
+    next to the flat's end, to first order of their width.
     """
     x = (np.arange(1100) + 0.5) / 100.0 - 5.5
     edges = rounded_edge(np.abs(x), 5.5, 1.5, 30.0)[:, None]
@@ -71,7 +71,7 @@ def test_edges_from_scans_are_the_edges(tmp_path):
 
 
 def test_mirrored_scans_have_mirrored_pressures(tmp_path):
-    """Of a joint that is its image across X = 0, along whose flanks y points to opposite sides."""
+    """The joint is its own image across X = 0, and y along its flanks has opposite senses."""
     x, y = np.meshgrid((np.arange(61) - 30) * 0.2, (np.arange(311) - 155) * 0.2, indexing="ij")
     waves = 2e-3 * np.sin(0.9 * x + 0.3) * np.cos(0.27 * y + 0.7) + 1e-5 * y
     waves += 5e-4 * np.random.default_rng(0).standard_normal(x.shape)
@@ -91,7 +91,7 @@ def test_mirrored_scans_have_mirrored_pressures(tmp_path):
 
 
 def test_planes_are_exact_on_flanks(tmp_path):
-    """Along the frames of both, of a skewed slot too; and what is meshed has them on the blade."""
+    """They follow both frames, also of a skewed slot, and the mesh has them on the blade."""
     x, y = np.meshgrid((np.arange(70) - 34.5) * 0.2, (np.arange(90) - 44.5) * 0.8, indexing="ij")
     tilted = scan(tmp_path, "tilted", 1e-3 * x - 2e-4 * y, (0.2, 0.8))
     down = scan(tmp_path, "down", 2e-4 * y - 1e-3 * x, (0.2, 0.8))
@@ -136,7 +136,7 @@ def test_surfaces_that_do_not_suit_a_flank_are_refused(tmp_path, case, columns, 
 
 @pytest.mark.slow
 def test_a_run_wears_what_was_measured(tmp_path):
-    """Ridges on the blade's flank wear off first; the unworn gap in space is the scan and form."""
+    """Ridges on the blade's flank wear first; the unworn gap is the scan plus the form."""
     x = (np.arange(600) + 0.5) / 50.0 - 6.0
     ridges = np.repeat(2e-3 * np.cos(2.0 * np.pi * x / 1.5)[:, None], 620, axis=1)
     blade = scan(tmp_path, "ridges", ridges, (0.02, 0.1))

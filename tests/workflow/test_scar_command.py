@@ -1,4 +1,4 @@
-"""``fretscale scar`` and ``fretscale surface``: scans in, numbers out; surfaces out as scans."""
+"""Tests of ``fretscale scar`` and ``fretscale surface``: numbers from scans, scans from runs."""
 
 import json
 import warnings
@@ -36,7 +36,7 @@ output: {figures: false, paraview: false}
 
 @pytest.fixture(scope="module")
 def pair(tmp_path_factory):
-    """Two scans in files of different kinds, and the volume between them."""
+    """Return two scans in files of different kinds, and the volume between them."""
     folder = tmp_path_factory.mktemp("scar")
     before, after, volume, _, _ = scans(3, cells=96, noise=5e-5, missing=0.02)
     write_scan(folder / "before.sur", before)
@@ -81,7 +81,7 @@ def test_wrong_words_are_told_in_one_line(pair, more, words):
 
 
 def test_files_mixed_up_are_told(pair):
-    """The other way round the body has grown, which no clear area says."""
+    """In the reverse order the body has grown, although no clear area shows it."""
     ended = command("scar", pair[1], pair[0])
     assert ended.exit_code == 2
     assert "no area is clearly deeper than the noise" in ended.stderr
@@ -113,7 +113,7 @@ DAMAGE = {
 
 @pytest.mark.parametrize("name", DAMAGE)
 def test_a_damaged_scan_gives_no_numbers(pair, name, tmp_path):
-    """Refused in one line, without warnings, and NaN is no result."""
+    """It is refused in one line, without warnings, and NaN is no result."""
     path = tmp_path / name
     write_scan(path, read_scan(str(pair[1]), None, None))
     raw, (place, wrong) = bytearray(path.read_bytes()), DAMAGE[name]
@@ -128,7 +128,7 @@ def test_a_damaged_scan_gives_no_numbers(pair, name, tmp_path):
 
 @pytest.mark.slow
 def test_worn_surfaces_of_a_run_are_scans_of_them(tmp_path):
-    """Written, read and taken off the unworn ones: the volumes of the run, body by body."""
+    """Written, read and subtracted from unworn ones, they give the volumes of the run."""
     rng, grid = np.random.default_rng(2), Grid.covering((0.9, 0.9), (120, 120))
     first = 1e-4 * rng.normal(size=grid.shape)
     write_scan(tmp_path / "a.sur", Scan(first, grid.pitch))

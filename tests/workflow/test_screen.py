@@ -1,4 +1,4 @@
-"""What a run says while it works: how loud, how far it is, and where to look at its end."""
+"""Tests of terminal output of a run: amount, progress, and final hints."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_the_log_has_all_however_quiet_it_is(
 
 @pytest.fixture
 def terminal(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
-    """A terminal in place of stderr, of 80 columns or as many as asked for; what has been on it.
+    """Replace stderr by a terminal of 80 or other columns; return a function with its content.
 
     It moves its cursor, whatever terminal the tests are run on.
     """
@@ -86,7 +86,7 @@ def test_a_stage_shows_how_far_it_is(
 def test_a_long_part_is_forecast_before_any_of_it_is_done(
     terminal: Callable[[], str], tmp_path: Path
 ) -> None:
-    """5 min of wear are expected and 1 min after it, which takes longer as all did before it."""
+    """5 min of wear and 1 min after it are expected, scaled as the start took longer."""
     reporter = Reporter(tmp_path / "log", expected=RunTime(course=300.0, after=60.0))
     with reporter.course("wear"):
         reporter._screen._rows.refresh()
@@ -95,7 +95,7 @@ def test_a_long_part_is_forecast_before_any_of_it_is_done(
 
 
 def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_path: Path) -> None:
-    """What is left is told in full; how far it is gives way."""
+    """The remaining time is shown in full, and the progress text is cut."""
     shown = screen.Screen(on=True)
     with shown.row("stress under the contacts") as row:
         row.show(0.5, 20 * "jump 12 of about 40 ", "about 20 min to go")
@@ -107,7 +107,7 @@ def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_p
 
 @pytest.mark.parametrize("terminal", [40], indirect=True)
 def test_a_narrow_terminal_tells_how_far_it_is_and_no_more(terminal: Callable[[], str]) -> None:
-    """Of 40 columns a bar and a forecast would leave no room for it."""
+    """In 40 columns a bar and a forecast would leave no room for it."""
     rows = screen.Screen(on=True)
     with rows.row("condensation") as row:
         row.show(0.4, "2 of 5 steps", "about 20 min more")
@@ -129,7 +129,7 @@ def test_a_terminal_that_only_prints_is_told_by_lines(
 def test_where_there_is_no_terminal_a_line_now_and_then(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Of 1000 nodes in ten minutes: ten lines."""
+    """1000 nodes in ten minutes give ten lines."""
     now = [100.0]
     monkeypatch.setattr("time.perf_counter", lambda: now[0])
     reporter = Reporter(tmp_path / "log")

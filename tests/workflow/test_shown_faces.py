@@ -1,4 +1,4 @@
-"""Contact faces in ParaView's files that are no rectangles: what is shown is the face."""
+"""Contact faces that are no rectangles have their true shape in ParaView's files."""
 
 import shutil
 from pathlib import Path
@@ -22,7 +22,7 @@ RADIUS, CENTRE, END = 4.0, np.array([0.5, -7.0]), 2.0
 
 
 def disc(radius: float, centre: Array, edges: int = 200) -> tuple[Array, Array]:
-    """Nodes and facets of a round face, the first in the middle."""
+    """Return nodes and facets of a round face, with the first node in the middle."""
     angle = np.linspace(0.0, 2.0 * np.pi, edges, endpoint=False)
     rim = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     around = 1 + np.arange(edges)
@@ -31,7 +31,7 @@ def disc(radius: float, centre: Array, edges: int = 200) -> tuple[Array, Array]:
 
 @pytest.fixture(scope="module")
 def round_face(results: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run with a round intrados of body 2 that hangs over the end of body 1's, at x = 2."""
+    """Return results with a round intrados of body 2 that overhangs body 1's end at x = 2."""
     folder = tmp_path_factory.mktemp("round")
     shutil.copy(results, folder / "results.h5")
     corners = [[-9.0, -40.0], [END, -40.0], [END, 40.0], [-9.0, 40.0]]
@@ -51,7 +51,7 @@ def round_face(results: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def cut_disc() -> float:
-    """Area of the disc up to x = END [mm²]."""
+    """Return the area of the disc up to x = END [mm²]."""
     angle = np.arccos((END - CENTRE[0]) / RADIUS)
     return float(RADIUS**2 * (np.pi - angle + 0.5 * np.sin(2.0 * angle)))
 
@@ -82,7 +82,7 @@ def test_its_points_carry_what_the_run_has_on_it(round_face: Path) -> None:
 
 
 def test_an_angle_keeps_its_corner() -> None:
-    """Two legs of cells: no triangle reaches across, and none is missing."""
+    """For two legs of cells no triangle reaches across, and none is missing."""
     grid = Grid((6, 5), (1.0, 2.0))
     on = np.zeros(grid.shape, dtype=bool)
     on[:2], on[:, :2] = True, True

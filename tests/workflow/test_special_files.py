@@ -1,4 +1,4 @@
-"""Pipes, sockets and devices in the place of files: told in one line, and never waited for."""
+"""Pipes, sockets and devices in place of files are reported in one line, without waiting."""
 
 import os
 import shutil
@@ -35,7 +35,7 @@ SPECIAL = {
 
 @pytest.fixture(params=SPECIAL)
 def put(request, tmp_path, monkeypatch):
-    """Puts it in the place of a file, by a path that is short enough for a socket."""
+    """Return a function that puts it in place of a file, by a path short enough for a socket."""
 
     def in_place_of(path):
         path.unlink(missing_ok=True)
@@ -59,7 +59,7 @@ def woken():
 
 @pytest.fixture(scope="module")
 def uncleared(tmp_path_factory):
-    """A wear run that has its summary, and still what it would go on from without."""
+    """Return a wear run with its summary and the files it would have resumed from."""
     folder = tmp_path_factory.mktemp("uncleared")
     (folder / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     (folder / "wear.yaml").write_text(ROLLER_WEAR, encoding="utf-8")
@@ -71,7 +71,7 @@ def uncleared(tmp_path_factory):
 
 @pytest.fixture
 def run(uncleared, tmp_path):
-    """The same, elsewhere."""
+    """Return a copy of this run."""
     return shutil.copytree(uncleared / "out", tmp_path / "out")
 
 

@@ -1,4 +1,4 @@
-"""Cases of rig specimens: what a run leaves, closed forms and balances, and how it refuses."""
+"""Tests of cases of rig specimens: files, closed forms, balances, and refusals."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ from workflow.kinds import load_case, parse_case, template
 CASES = Path(__file__).parents[2] / "cases"
 STEEL = Material(200e3, 0.3)
 ALPHA = 1.5e-9
-# What the solver and its bookkeeping leave.
+# Tolerance for the solver and its bookkeeping.
 SOLVER = 1e-9
 SMALL = """\
 title: Small pair
@@ -56,7 +56,7 @@ wear:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Small cases and their runs; reduced models are shared through a cache of their own."""
+    """Return a folder with small cases and runs; reduced models share a separate cache."""
     folder = tmp_path_factory.mktemp("specimens")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FRETSCALE_CACHE", str(folder / "cache"))
@@ -65,7 +65,7 @@ def folder(tmp_path_factory):
 
 
 def run(folder, name, *overrides):
-    """The folder of a run with overrides."""
+    """Return the folder of a run with overrides."""
     quiet = () if name == "pictured" else ("output.paraview=false", "output.figures=false")
     settings = [part for entry in (*quiet, *overrides) for part in ("--set", entry)]
     result = invoke("run", folder / "small.yaml", "--out", folder / name, *settings)
@@ -87,7 +87,7 @@ def curved(folder):
 
 @pytest.fixture(scope="module")
 def pictured(folder, curved):
-    """The same with its pictures."""
+    """Return the same run with its pictures."""
     return run(folder, "pictured")
 
 
@@ -98,7 +98,7 @@ def summary(curved):
 
 @pytest.fixture(scope="module")
 def flat(folder, curved):
-    """Flat, worn for a number of cycles, with the reduced models of the curved pair."""
+    """Return flat specimens, worn for some cycles, with the reduced models of the curved pair."""
     overrides = "structure.form=null", "wear.energy=null", "wear.cycles=3e5"
     return run(folder, "flat", *overrides)
 
@@ -136,7 +136,7 @@ class TestSummary:
         assert spread["cycles"] > 2.0 > spread["energy"] > 1.0
 
     def test_linked_half_space_sticks_as_the_specimens(self, summary):
-        """Worn into full contact, all over the pad: by itself it is 5 % stiffer."""
+        """The pad is worn into full contact; the half-space alone is 5 % stiffer."""
         worn = summary["loads"][0]["worn"]
         assert worn["half_space"]["area"] == pytest.approx(1.0)
         exact, tied = worn["stick_stiffness"], summary["tied_pad"]["tangential"]
@@ -163,7 +163,7 @@ class TestSummary:
 
     @pytest.mark.slow
     def test_coefficient_that_a_source_would_have_had(self, folder, curved, summary):
-        """Run with it, the pair is steady after the cycles that the source reports."""
+        """With this coefficient the pair is steady after the cycles that the source reports."""
         (reported,) = summary["reported"]
         one, other = reported["coefficients"]
         again = summary_of(
@@ -388,7 +388,7 @@ def test_shipped_cases_meet_their_expectations(name, tmp_path):
 
 
 def as_scans(folder, name, heights):
-    """Heights [mm] of a specimen along and across its own strip, as a scan of either of them."""
+    """Write heights [mm] of a specimen along and across its strip, as a scan of either."""
     np.save(folder / f"{name}.npy", heights)
     scan = {"file": f"{name}.npy", "unit": "mm", "level": "none", "pitch": ["10 um", "10 um"]}
     return {"body_1": scan, "body_2": scan | {"angle": "90 deg"}}
@@ -400,7 +400,7 @@ def model_of(folder, surfaces, *overrides):
 
 
 def test_scans_of_specimens_lie_as_their_strips_do(folder):
-    """Planes: body 2 is body 1 turned about the line x = y, which swaps along and across."""
+    """For planes, body 2 is body 1 turned about x = y, which swaps along and across."""
     u, v = np.meshgrid(*2 * [(np.arange(120) - 59.5) * 0.01], indexing="ij")
     surfaces = as_scans(folder, "plane", 1e-3 * u + 3e-3 * v)
     only = ({"body_1": surfaces["body_1"]}, {"body_2": surfaces["body_2"]})
@@ -416,7 +416,7 @@ def test_scans_of_specimens_lie_as_their_strips_do(folder):
 
 @pytest.mark.slow
 def test_a_form_from_scans_of_specimens_is_the_form(folder):
-    """Radii along and across each strip: the finer the pad's squares the more so."""
+    """Radii along and across each strip agree better the finer the pad's squares."""
 
     def sagitta(x, radius):
         return x**2 / (radius + np.sqrt(radius**2 - x**2))

@@ -1,4 +1,4 @@
-"""Wear of reduced specimens in cycle blocks, by every law; and the specimens of the rig."""
+"""Tests of wear of reduced specimens in cycle blocks, by every law; and of the rig's specimens."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from workflow.kinds import load_case
 
 @pytest.fixture(scope="module")
 def pair():
-    """A coarse pair of crossed strips."""
+    """Return a coarse pair of crossed strips."""
     face, pads = coarse_pads()
     return ReducedPair.from_stiffness(face, *pads)
 
@@ -42,7 +42,7 @@ def worn(
     stepper=ExplicitStepper(0.5),  # noqa: B008 - frozen
     stroke=STROKE,
 ):
-    """States at all blocks."""
+    """Return the states at all blocks."""
     fretted = FrettedPair(
         pair, tuple(map(EnergyLaw, laws)), FrettingConditions(force, stroke, FRICTION)
     )
@@ -106,7 +106,7 @@ class TestWear:
 
 
 class TestLaws:
-    """The laws of wear cases, from the case, against rates made by hand of slips and pressures."""
+    """Laws of wear cases, compared with rates computed by hand from slips and pressures."""
 
     @pytest.fixture
     @staticmethod
@@ -124,7 +124,7 @@ class TestLaws:
         conditions = FrettingConditions(87.0, STROKE, FRICTION)
 
         def rates(laws, state=None):
-            """What a cycle takes off, and pressure and slip of that cycle."""
+            """Return the depths worn in a cycle, and pressure and slip of that cycle."""
             fretted = FrettedPair(pair, laws, conditions)
             block = fretted.block(state or NodalState.unworn(curved), 0.0)
             return block.wear, block.contact.normal.pressure, block.contact.cycle_slip
@@ -144,7 +144,7 @@ class TestLaws:
         np.testing.assert_allclose(wear[1], 1.5e-9 * FRICTION * pressure * slip, rtol=1e-12)
 
     def test_energy_amplitude(self, laws, unworn):
-        """The amplitude is a quarter of the way that a node slides in a cycle."""
+        """The amplitude is a quarter of the path that a node slides in a cycle."""
         wear, pressure, slip = unworn(
             laws("wear.law=energy_amplitude", "wear.reference_amplitude=5 um")
         )
@@ -153,7 +153,7 @@ class TestLaws:
 
     @pytest.mark.parametrize("scope", ["local", "global"])
     def test_coefficient_that_changes_with_energy(self, laws, unworn, pair, curved, scope):
-        """On the way through its table: by place, or everywhere alike."""
+        """The coefficient follows its table, locally or uniformly."""
         table = f"{{scope: {scope}, energy: [0, 500], factor: [1, 3]}}"
         changing = laws(f"wear.body_1.evolution={table}")
         fretted = FrettedPair(pair, changing, FrettingConditions(87.0, STROKE, FRICTION))
@@ -171,7 +171,7 @@ class TestLaws:
         np.testing.assert_allclose(wear[1], 1.5e-9 * FRICTION * pressure * slip, rtol=1e-12)
 
     def test_nothing_wears_below_a_threshold(self, laws, pair, curved):
-        """V = α (ΣEd - Ed_th), in blocks whose limit is not known before."""
+        """V = α (ΣEd - Ed_th) holds in blocks whose end is not known beforehand."""
         threshold = 400.0
         with_threshold = laws(
             *(f"wear.body_{n}.evolution={{scope: global, threshold: {threshold}}}" for n in (1, 2))
@@ -203,7 +203,7 @@ class TestLaws:
 
 @pytest.mark.slow
 class TestRig:
-    """The specimens of the rig on the default mesh, 121 nodes; α of 1500 µm³/J for either body."""
+    """Specimens of the rig on the default mesh, 121 nodes; α of 1500 µm³/J for either body."""
 
     @pytest.fixture(scope="class")
     @staticmethod
@@ -213,7 +213,7 @@ class TestRig:
         return ReducedPair.from_stiffness(mesh.interfaces[0], *pad_stiffnesses(specimen, mesh))
 
     def test_flat_pads(self, rig):
-        """Even pressure within some 1e4 cycles; the secant falls, since edges slip earlier."""
+        """Pressure becomes uniform in some 1e4 cycles; the secant falls, as edges slip earlier."""
         states = list(worn(rig, np.zeros(121), 1.5e5))
         cycles = np.array([s.cycles for s in states])
         peaks = np.array([s.contact.normal.pressure.max() for s in states]) / 17.0
@@ -226,7 +226,7 @@ class TestRig:
         assert 0.9 * before < after < 0.97 * before
 
     def test_curved_pads(self, rig):
-        """One steady stiffness, reached after cycles as 1/F and at much the same energy."""
+        """The steady stiffness is reached after cycles ~ 1/F, at nearly the same energy."""
         steady, energies = {}, {}
         for force, cycles in ((17.0, 4e6), (87.0, 1e6), (150.0, 6e5), (250.0, 4e5)):
             states = list(worn(rig, rig.face.gap, cycles, force))

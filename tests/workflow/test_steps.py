@@ -1,4 +1,4 @@
-"""Steps of a run on the disk: taken as kept wherever the run was cut off, and only what is ours."""
+"""Tests of stored steps: they are restored after any interruption, and only if they are ours."""
 
 import pickle
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class CutOff(BaseException):
 
 
 def run_in(folder):
-    """What a run in a folder has, one that goes on if something was kept there."""
+    """Return a run in a folder, which resumes if something was stored there."""
     output = OutputFolder(folder)
     kept = checkpoint.load(output, PROVENANCE) if output.checkpoint.exists() else None
     output.reserve_state()
@@ -36,9 +36,9 @@ def run_in(folder):
 
 
 class Work:
-    """Steps with steps of their own, marches of marches and warnings; ``done`` of it is counted.
+    """Steps with nested steps, marches and warnings; ``done`` counts the work.
 
-    It is cut off after so many steps, never if negative.
+    It is interrupted after ``most`` steps, or never if that is negative.
     """
 
     def __init__(self, taken_by, reporter, most=-1):
@@ -57,7 +57,7 @@ class Work:
         return sum(part.sum() for part in parts) + parts[0]
 
     def advance(self, state):
-        """A march of two within a march."""
+        """Do a march of two within a march."""
         if state[0, 0] > 400.0:
             return None
         inner = self.steps.march("inner", state, self.further)
@@ -75,7 +75,7 @@ class Work:
 
 
 def worked(folder, most=-1):
-    """What comes out, warnings, and how much was done; None for what was cut off."""
+    """Return result, warnings, and amount of work; the result is None if interrupted."""
     run = run_in(folder)
     try:
         with kept_steps(run) as taken_by:
@@ -99,7 +99,7 @@ def assert_same(end, whole):
 
 @pytest.mark.parametrize(("share", "every"), [(np.inf, 6), (steps.SHARE, 1)])
 def test_a_run_can_be_cut_off_anywhere(share, every, monkeypatch, tmp_path):
-    """Each step is brought to the disk, or all when it is cut off; none is computed again."""
+    """Steps are saved one by one or on interruption, and none is computed again."""
     monkeypatch.setattr(steps, "SHARE", share)
     whole = worked(new(tmp_path / "whole"))
     total, warnings = whole[2], whole[1]

@@ -1,7 +1,7 @@
-"""What whole cells leave of wear in partial slip, against limiting shapes in closed form.
+"""Tests of the error of whole cells in partial slip, against limiting shapes in closed form.
 
-With similar bodies, ν = 0 and loads or motions that are held, the zone that always sticks is that
-of Cattaneo and Mindlin for good, |r| < c, and nothing presses outside in the end (Popov 2014,
+With similar bodies, ν = 0 and loads or motions that are held, the zone that always sticks remains
+that of Cattaneo and Mindlin, |r| < c, and nothing presses outside in the end (Popov 2014,
 doi:10.1038/srep03749).
 """
 
@@ -45,7 +45,7 @@ FIXED = ", cycles: 1.5e7"
 
 
 def errors(folder, legs: tuple[str, str, str], cells: int, step: str = FIXED, life: str = "3e7"):
-    """The interface of a run under ``legs`` that press, and shear one way and the other."""
+    """Return the interface of a run under ``legs`` that press, and shear in both directions."""
     pressing, along, value = legs
     line = "/mm" in pressing
     shape = {"shape": "cylinder" if line else "sphere", "step": step, "life": life}
@@ -59,14 +59,17 @@ def errors(folder, legs: tuple[str, str, str], cells: int, step: str = FIXED, li
 
 
 def limit(w, c: float, line: bool) -> dict[str, float]:
-    """Largest depth and volume of the worn depth ``w(r)`` outside c, both bodies together."""
+    """Return largest depth and volume of the worn depth ``w(r)`` outside c, summed over bodies."""
     a = brentq(w, 1.1 * c, 3.0 * c)
     volume, _ = quad(lambda r: w(r) * (2.0 if line else 2.0 * np.pi * r), c, a)
     return {"depth": max(map(w, np.linspace(c, a, 2001))), "volume": volume}
 
 
 def limit_of_cylinder(P: float, Q: float) -> dict[str, float]:
-    """w' = (2 P1/π E* - (x² - c²)/R)/√(x² - c²) with P1 = Q/µ: the punch is flat and Hertz's."""
+    """Integrate w' = (2 P1/π E* - (x² - c²)/R)/√(x² - c²), with P1 = Q/µ.
+
+    It is the superposition of a flat punch and Hertz.
+    """
     c = np.sqrt(4.0 * RADIUS * P / (np.pi * MODULUS) * (1.0 - Q / (FRICTION * P)))
     flat = 2.0 * Q / (FRICTION * np.pi * MODULUS)
 
@@ -78,7 +81,7 @@ def limit_of_cylinder(P: float, Q: float) -> dict[str, float]:
 
 
 def limit_of_sphere(d: float, c: float) -> dict[str, float]:
-    """w = r²/2R - d + (2/π) ∫_0^c (d - x²/R)/√(r² - x²) dx, of the other sign."""
+    """Evaluate w = r²/2R - d + (2/π) ∫_0^c (d - x²/R)/√(r² - x²) dx, of the other sign."""
 
     def w(r: float) -> float:
         half = np.arccos(c / r) if r > c else 0.0
@@ -96,7 +99,7 @@ def assert_told(found: dict, exact: dict[str, float], most: float = 3.0) -> None
 
 
 def test_a_punch_of_cells_is_narrower_than_these() -> None:
-    """Strips under a mean pressure each, held in their middles: capacity of a segment, u = ln 2/c.
+    """Cells with mean pressures, held in their middles: capacity of a segment, u = ln 2/c.
 
     Per unit force over π E*/2, the displacement is -ln of the distance.
     """
@@ -111,7 +114,7 @@ def test_a_punch_of_cells_is_narrower_than_these() -> None:
 
 @pytest.mark.parametrize("strips", [40, 48])
 def test_a_cylinder_tells_where_its_cells_put_the_border(tmp_path, strips) -> None:
-    """14 % too little is worn on 40 strips, 17 % too much on 48, in two fixed steps."""
+    """Wear is 14 % too small on 40 cells, 17 % too large on 48, in two fixed steps."""
     found = errors(tmp_path, ("P: 700 N/mm", "Qx", "134.4 N/mm"), strips)
     assert_told(found, limit_of_cylinder(700.0, 134.4), most=1.6)
 
@@ -119,7 +122,7 @@ def test_a_cylinder_tells_where_its_cells_put_the_border(tmp_path, strips) -> No
 def test_a_cylinder_that_slides_has_no_such_border(tmp_path) -> None:
     found = errors(tmp_path, ("P: 700 N/mm", "shift_x", "8 um"), 32, ", cycles: 5e3", "1e4")
     assert found["depth_1"] > 0.0
-    assert found["error"]["volume"]["grid"] is None  # no lives are lived here
+    assert found["error"]["volume"]["grid"] is None  # no probe runs in tests
 
 
 SPHERES = {
@@ -134,6 +137,6 @@ SPHERES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("load", SPHERES)
 def test_a_sphere_tells_where_its_cells_put_the_border(tmp_path, load) -> None:
-    """4 and 7 % too much is worn on 48 cells; c = 0.18 mm, µE*(d - c²/R) = G* shift."""
+    """Wear is 4 and 7 % too large on 48 cells; c = 0.18 mm, µE*(d - c²/R) = G* shift."""
     legs, exact = SPHERES[load]
     assert_told(errors(tmp_path, legs, 48, ", cycles: 5e6"), exact)

@@ -1,4 +1,4 @@
-"""Stress under the contacts of a wear run, and the fretting parameter: files, balance, symmetry."""
+"""Tests of stress under contacts of a wear run, and of the fretting parameter."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -46,24 +46,24 @@ def begin(start: Any, folder: Path, *overrides: str) -> Any:
 
 @pytest.fixture(scope="module")
 def normal(start: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """A run whose slips are the structure's."""
+    """Return a run whose slips are the structure's."""
     return begin(start, tmp_path_factory.mktemp("normal"))
 
 
 @pytest.fixture(scope="module")
 def full(start: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """A run with friction of the half-space."""
+    """Return a run with friction of the half-space."""
     return begin(start, tmp_path_factory.mktemp("full"), "contact.method=full")
 
 
 @pytest.fixture(scope="module")
 def line(start: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """A run in plane strain."""
+    """Return a run in plane strain."""
     return begin(start, tmp_path_factory.mktemp("line"), "structure.dimension=2")
 
 
 def peak_traction(file: h5py.File, flank: str, moment: str) -> Array:
-    """Tractions qx, qy, p that the run recorded at peak load."""
+    """Return the tractions qx, qy, p that the run recorded at peak load."""
     jump = sorted(file["surfaces"][flank])[0 if moment == "unworn" else -1]
     contact = file["contact"][flank][jump]
     return np.concatenate([contact["shear"][()], contact["pressure"][()][None]])
@@ -77,7 +77,7 @@ def peak_traction(file: h5py.File, flank: str, moment: str) -> Array:
 def test_section_is_that_of_the_recorded_tractions_and_of_the_structure(
     request: pytest.FixtureRequest, method: str, moment: str
 ) -> None:
-    """What the structure carries past the contact leaves its face free: it pulls along that."""
+    """Stress that the structure carries past the contact pulls along its free face."""
     run = request.getfixturevalue(method)
     with h5py.File(run.folder / "results.h5") as file:
         for flank in FLANKS:
@@ -126,7 +126,7 @@ def test_summary_tells_the_largest_of_the_maps(normal: Any) -> None:
 
 
 def test_each_body_is_pulled_at_its_end(normal: Any) -> None:
-    """At peak load the blade slides along x, so that qx < 0: it is pulled at +x, the disk at -x."""
+    """At peak load the blade slides along x, so qx < 0: it is pulled at +x, the disk at -x."""
     with h5py.File(normal.folder / "results.h5") as file:
         for flank in FLANKS:
             group = file["stress/section"][flank]
@@ -136,7 +136,7 @@ def test_each_body_is_pulled_at_its_end(normal: Any) -> None:
 
 
 def test_wear_takes_the_peaks_off(normal: Any) -> None:
-    """Of the pressure at once; stress moves on to where the edge has moved, and falls less."""
+    """Pressure peaks fall at once; stress moves with the edge of the contact and falls less."""
     for flank in FLANKS:
         peaks = normal.summary[flank]["peak_pressure"]
         assert 0.9 < peaks["worn"] / peaks["unworn"] < 0.95
@@ -171,7 +171,7 @@ def test_friction_parameter_integrates_to_the_energy_of_the_cycle(
 
 
 def reversed_cycle(grid: Grid) -> CycleTractions:
-    """A pressure even in x and y, sliding back and forth along x, friction 0.5."""
+    """Return a pressure even in x and y, sliding back and forth along x, friction 0.5."""
     closed = 1.0 - (grid.x / 0.6) ** 2 - (grid.y / 0.8) ** 2
     pressure = 500.0 * np.sqrt(np.maximum(0.0, closed))
     way = np.array([1.0, -1.0])[:, None, None]
@@ -186,7 +186,7 @@ def reversed_cycle(grid: Grid) -> CycleTractions:
 def maps(
     life: Life, grid: Grid, body: Literal[1, 2], cycle: CycleTractions, known: np.ndarray
 ) -> dict[str, Array]:
-    """Maps at the critical distance, under the tractions alone."""
+    """Return maps at the critical distance, under the tractions alone."""
     transfer = SimpleNamespace(inside=np.ones(grid.shape, dtype=bool))
     stage = SimpleNamespace(grid=grid, transfer=transfer, transfer_of=lambda _: transfer)
     stressed = StressedBody(stage, METAL, body)  # type: ignore[arg-type]
@@ -196,7 +196,7 @@ def maps(
 
 
 def test_symmetric_load_fares_both_flanks_alike(normal: Any) -> None:
-    """One flank is the mirror image of the other, with y the other way."""
+    """One flank is the mirror image of the other, with y reversed."""
     with h5py.File(normal.folder / "results.h5") as file:
         for place in ("body_1", "body_2"):
             for moment in ("unworn", "worn"):
@@ -248,7 +248,7 @@ def test_increments_that_stick_are_in_the_maps(normal: Any) -> None:
 
 
 class Warnings:
-    """As much of a reporter as is needed to hear warnings."""
+    """Minimal reporter that collects warnings."""
 
     def __init__(self) -> None:
         self.said: list[str] = []
@@ -259,7 +259,7 @@ class Warnings:
 
 @pytest.mark.parametrize(("share", "count"), [(0.0, 0), (0.3, 1)])
 def test_shear_that_nobody_knows_is_warned_of(share: float, count: int) -> None:
-    """At peak load twice: the section lacks it too."""
+    """At peak load there are two warnings, since the section lacks it too."""
     for increment, more in ((0, 0), (1, count)):
         heard: Any = Warnings()
         unknown = np.zeros((2, 3))
@@ -391,12 +391,12 @@ def test_maps_are_on_the_flanks(normal: Any, paraview: Path) -> None:
 
 
 def local_points(mesh: Any, grid: h5py.Group) -> np.ndarray:
-    """Points of a mesh in the interface frame."""
+    """Return points of a mesh in the interface frame."""
     return (mesh.points - grid.attrs["origin"]) @ grid.attrs["axes"].T
 
 
 def test_sections_sit_under_and_above_the_flank(normal: Any, paraview: Path) -> None:
-    """What lies in the body, and nothing else; stress along the face and the global axes."""
+    """They lie within the body, with stress along the face and the global axes."""
     import pyvista
 
     with h5py.File(normal.folder / "results.h5") as file:

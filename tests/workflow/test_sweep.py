@@ -1,4 +1,4 @@
-"""``fretscale sweep``: its file, its designs, and what it makes of runs that end and that fail."""
+"""Tests of ``fretscale sweep``: its file, its designs, and successful and failed runs."""
 
 import csv
 import json
@@ -27,7 +27,7 @@ PATIENCE = 120.0
 
 @pytest.fixture(scope="module", autouse=True)
 def _jobs_here():
-    """A process for each run would take longer than the run (test_runs.py has them)."""
+    """Run jobs here, as a process would take longer than its run (test_runs.py has them)."""
     with jobs_here():
         yield
 
@@ -102,7 +102,7 @@ def drawn(design):
 
 
 def test_a_sample_is_a_latin_hypercube_of_its_distributions(tmp_path):
-    """Each of n equal shares of every distribution is hit once, so means are exact to O(1/n)."""
+    """Each of n equal shares of a distribution is hit once, so means are exact to O(1/n)."""
     friction, radius, young, force, history = drawn(runs(tmp_path, SAMPLE))
     share = (np.sort(np.array(friction, float)) - 0.4) / 0.2 * 400
     assert np.all(np.abs(share - (np.arange(400) + 0.5)) <= 0.5 + 1e-2)  # six digits of 0.4
@@ -123,7 +123,7 @@ def test_a_sample_is_the_same_again_and_another_with_another_seed(tmp_path):
 
 
 def test_names_tell_runs_apart_and_stay_short(tmp_path):
-    """Units lose their signs, which must not make one run of two; long ones end in a hash."""
+    """Removing signs of units must not merge two runs; long names end in a hash."""
     values = ", ".join(f'"{name}"' for name in ("a/b", "ab", "a b", "x" * 300))
     design = runs(tmp_path, f"vary:\n  title: {{values: [{values}]}}\n")
     assert len({run.name for run in design}) == 4
@@ -242,7 +242,7 @@ vary:
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
-    """A sweep of four runs, of which two slide, and how it ended; not to be changed."""
+    """Return a sweep of four runs, of which two slide, and its exit; tests must not change it."""
     folder = tmp_path_factory.mktemp("sweep")
     path = write(folder, GRID)
     return path, folder / "out", sweep(path, folder / "out")
@@ -266,7 +266,7 @@ def test_a_failed_run_is_a_row_and_stops_nobody(done):
 
 
 def test_runs_of_which_nothing_is_drawn(tmp_path):
-    """Of a joint alone there is a table, and no figure: the sweep ends well all the same."""
+    """A joint alone gives a table without a figure, and the sweep succeeds."""
     (tmp_path / "joint.yaml").write_text(JOINT, encoding="utf-8")
     path = tmp_path / "sweep.yaml"
     path.write_text("case: joint.yaml\nvary:\n  joint.friction: {values: [0.4, 0.5]}\n", "utf-8")
@@ -323,7 +323,7 @@ def test_runs_of_another_case_need_force(tmp_path):
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_ctrl_c_keeps_what_is_done(tmp_path):
-    """One line, exit code 130, a table of what has ended; the same command does the rest."""
+    """It gives one line, exit code 130, and a table; the same command completes the rest."""
     values = ", ".join(f"{400 + number} N" for number in range(6))
     path = write(
         tmp_path, f"case: contact.yaml\nvary:\n  load_path.legs.0.P: {{values: [{values}]}}\n"
@@ -351,7 +351,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
 
 
 def worn(depth, line=False):
-    """Row of a run whose body 2 wears twice as much as body 1."""
+    """Return the row of a run whose body 2 wears twice as much as body 1."""
     flank = {"depth_1": depth, "depth_2": 2 * depth, "volume_1": 1.0, "volume_2": 2.0}
     flank |= {"energy": 5.0, "peak_pressure": {"unworn": 300.0, "worn": 200.0}}
     kinetics = {name: [0.0, 0.5 * flank[name], flank[name]] for name in list(flank)[:5]}
@@ -397,7 +397,7 @@ def test_varied_values_share_a_unit_where_they_can():
 
 
 def test_bands_over_the_cycles(tmp_path):
-    """Runs that end earlier than others leave the bands to those, and a failure is no run."""
+    """Runs that end earlier do not count in later bands, and failed runs never do."""
     from workflow.sweep.figures import kinetics_bands, write_sweep_figures
 
     rows = [worn(depth) for depth in (0.1, 0.2, 0.3, 0.4, 0.5)]

@@ -1,4 +1,4 @@
-"""What is missing of the system: named in one line, or installed where no password is needed."""
+"""Missing system packages are named in one line, or installed if no password is needed."""
 
 import os
 import shutil
@@ -15,7 +15,7 @@ APT = ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get"]
 
 @pytest.fixture
 def bare(monkeypatch):
-    """A machine that lacks one library, until apt-get installs it; the commands it was given."""
+    """Replace the machine by one that lacks a library until apt-get runs; return its commands."""
     commands = []
 
     def run(command, **options):
@@ -73,7 +73,7 @@ def test_missing_library_of_an_import_names_its_packages(bare):
 
 
 def test_needs_the_standard_library_only():
-    """Run by its path, with nothing else to import."""
+    """It is run by its path, with nothing else to import."""
     command = [sys.executable, "-I", "-S", system_check.__file__, "--imports"]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == system_check.FAILED

@@ -1,4 +1,4 @@
-"""One dialect of CSV for tables of loops, records of loops and recorded forces."""
+"""One CSV dialect for tables of loops, records of loops and recorded forces."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Templates of cases and sweeps: all that stands there as a comment is right without its sign."""
+"""Every entry that a template of a case or a sweep has as a comment is valid without its sign."""
 
 import json
 import re
@@ -48,7 +48,7 @@ NEEDS = {
     "  # size: 2 mm  # for CAD files only": CAD,
     "structure.cyclic": [SECTOR],
     **{f"structure.matrices.{part}": [APART] for part in APART_MATRICES},
-    # Points as far apart as takes a scan over all of the template's face.
+    # Points whose spacing lets a scan cover the whole face of the template.
     " surfaces:  # as measured, on top of the gap, or": [
         "structure.surfaces.body_1.pitch=[0.1, 0.2]"
     ],
@@ -79,18 +79,18 @@ NEEDS = {
 
 
 class Template:
-    """The lines of a template, with the places where something may be opened."""
+    """Lines of a template, with the places where a comment may be opened."""
 
     def __init__(self, text):
         self.lines = text.splitlines()
 
     def places(self):
-        """Line numbers at which a comment that may be opened begins."""
+        """Return line numbers at which a comment that may be opened begins."""
         first = next(i for i, line in enumerate(self.lines) if "title:" in line)
         return [i for i in range(first, len(self.lines)) if OPENED.match(self.lines[i])]
 
     def key(self, start):
-        """Dotted keys of the sections about a line and its own."""
+        """Return the dotted keys of the sections around a line and of the line itself."""
         depth, keys = self.depth(start), [OPENED.match(self.lines[start])[2]]
         for line in reversed(self.lines[:start]):
             match = re.match(r"( *(?:- )?)([\w.]+):", line)
@@ -103,7 +103,7 @@ class Template:
         return len(OPENED.match(self.lines[start])[1])
 
     def end(self, start, sign=""):
-        """The line after the section or entry that begins at a line."""
+        """Return the line after the section or entry that begins at a line."""
         below = " " * (len(self.lines[start]) - len(self.lines[start].lstrip())) + sign + "  "
         end = start + 1
         while end < len(self.lines) and self.lines[end].startswith(below):
@@ -111,7 +111,7 @@ class Template:
         return end
 
     def opened(self, start):
-        """The text with what begins at a line, and without what that takes the place of."""
+        """Return the text with the entry that begins at a line, without what it replaces."""
         indent, key = OPENED.match(self.lines[start]).groups()
         end = self.end(start, "# ")
         block = [re.sub(f"^{indent}# ", indent, line) for line in self.lines[start:end]]
@@ -126,7 +126,7 @@ class Template:
 
 
 def without(lines, start, indent, name):
-    """The lines without the entry of that name beside the one opened at a line."""
+    """Return the lines without the entry of that name next to the one opened at a line."""
     for ahead in (range(start - 1, -1, -1), range(start + 1, len(lines))):
         for i in ahead:
             if lines[i].startswith(f"{indent}{name}:"):
@@ -140,12 +140,12 @@ def without(lines, start, indent, name):
 
 
 def _brings(block, words):
-    """Whether a block has these words in it; behind a line's end, at the beginning of a line."""
+    """Return whether a block contains these words, at the beginning or after the end of a line."""
     return words.startswith((" ", "\n")) and words in f"\n{block}"
 
 
 def ways(text, tried, overrides=(), within=""):
-    """Whatever may be opened in turn, and then what is within that: key, text and overrides."""
+    """Yield key, text and overrides for each comment that may be opened, and those within it."""
     here = Template(text)
     for start in here.places():
         key = here.key(start)
@@ -161,7 +161,7 @@ def ways(text, tried, overrides=(), within=""):
 
 
 def test_every_comment_of_a_template_may_be_opened(folders):
-    """Kinds of load, law and shape, and entries; what stands in several templates is tried once."""
+    """Kinds of load, law and shape, and entries, are tested once over all templates."""
     tried, wrong = set(), []
     for kind in kinds():
         name = str(folders[kind] / "case.yaml")
@@ -176,7 +176,7 @@ def test_every_comment_of_a_template_may_be_opened(folders):
 
 @pytest.mark.parametrize("kind", kinds())
 def test_template_shows_every_kind_of_section(kind):
-    """Once at least, by the word that names it."""
+    """Each kind appears at least once, by the word that names it."""
     text = template(kind)
 
     def shown(model):

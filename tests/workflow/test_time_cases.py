@@ -1,4 +1,4 @@
-"""Cases in time: what they say, joints that wear at a stroke, commands."""
+"""Tests of cases in time: entries, joints that wear under a stroke, commands."""
 
 import csv
 from pathlib import Path
@@ -131,7 +131,7 @@ def test_a_table_of_factors_multiplies_what_the_joint_begins_with():
 
 
 def test_a_table_of_loops_takes_the_place_of_friction_and_stiffness(tmp_path):
-    """As a wear run writes it: kt in N/mm, energy in J."""
+    """The table is as a wear run writes it: kt in N/mm, energy in J."""
     rows = "energy [J],P [N],kt [N/mm],mu [1]\n0,60,1e4,0.2\n2,60,3e4,0.6\n"
     (tmp_path / "loops.csv").write_text(rows, encoding="utf-8")
     case = parse_case(JOINT, str(tmp_path / "case.yaml"), ["evolution={file: loops.csv}"])
@@ -160,7 +160,7 @@ def test_a_table_that_is_not_of_a_whole_joint_is_refused_before_the_run(tmp_path
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_marched_loop_has_the_energy_of_its_law(law):
-    """And encloses it: by trapezoids, of second order in 720 points a cycle."""
+    """Its area by trapezoids agrees to second order in 720 points a cycle."""
     more = ["joint.chi=-0.5", "joint.beta=1"] if law == "four_parameter_iwan" else []
     law_of_case = JointModel.of(parse_case(JOINT, "case.yaml", [f"joint.law={law}", *more])).at(0.0)
     displacement, force, dissipated = steady_loop(law_of_case, AMPLITUDE)
@@ -204,7 +204,7 @@ def test_a_joint_that_never_slides_cannot_be_aged_by_energy(tmp_path):
 
 
 def test_files_of_a_joint(tmp_path):
-    """Every dataset has unit and description; tables hold the same; a second run replaces them."""
+    """Datasets have unit and description; tables hold the same; a second run replaces them."""
     evolution = "evolution.friction={kind: linear, slope: 0.1 1/J}"
     run(tmp_path, JOINT, evolution, "energies=[0 J, 1 J]", "output.figures=true")
     folder = tmp_path / "out"
@@ -256,7 +256,7 @@ def test_reported_values_are_told_beside_the_computed(tmp_path):
 
 
 def test_a_preload_worn_to_nothing_ends_the_wear(tmp_path):
-    """N = N0 (1 - E/2 J): the energy goes towards 2 J, the last loops transmit nothing."""
+    """With N = N0 (1 - E/2 J), energy tends to 2 J, and the last loops transmit nothing."""
     wear = "evolution.normal_load={kind: linear, slope: -0.5 1/J}"
     summary = run(tmp_path, JOINT, wear, "ageing.cycles=1e6", "energies=[0 J, 1 J]")
     last = summary["states"][-1]
@@ -267,7 +267,7 @@ def test_a_preload_worn_to_nothing_ends_the_wear(tmp_path):
 
 
 def test_a_joint_that_cannot_be_is_refused(tmp_path):
-    """A residual stiffness above the whole one, as the paper's slope of kp per J would have it."""
+    """The paper's slope of kp per J would give a residual stiffness above the total one."""
     steep = "evolution.residual_stiffness={kind: linear, slope: 1 1/J}"
     law = "joint.law=bouc_wen", "joint.residual_stiffness=5 N/um", steep, "ageing={energy: 5 J}"
     code, message = refused(tmp_path, JOINT, *law)
@@ -286,7 +286,7 @@ def test_a_loop_is_read_as_a_measured_one(tmp_path):
 
 
 def test_what_can_be_charted(tmp_path):
-    """The step of a rig; of a joint alone nothing, whose jumps are as good as asked for."""
+    """The step of a rig can; of a joint alone nothing can, as its jumps keep their accuracy."""
     path = tmp_path / "case.yaml"
     path.write_text(RIG, encoding="utf-8")
     assert {axis.name for axis in axes_of(path, [], [])} == {"step"}

@@ -1,4 +1,4 @@
-"""Rigs in time that are shaken, hit or driven, and what wear does to them."""
+"""Tests of rigs in time that are shaken, hit or driven, and of the effect of wear."""
 
 import h5py
 import numpy as np
@@ -23,10 +23,10 @@ from workflow.kinds import template
 
 @pytest.mark.parametrize("step", [4e-4, 2e-4, 1e-4])
 def test_a_stuck_rig_is_linear(tmp_path, step):
-    """Amplitudes against the receptance: of second order in the step.
+    """Amplitudes agree with the receptance to second order in the step.
 
     Extremes among samples miss up to (ωh)²/8 of a sine, and Newmark's stiffness is off by a third
-    of (ωh)²/4; near the resonance that is a few times as much.
+    of (ωh)²/4; near the resonance the error is a few times as much.
     """
     exact = 50.0 * np.abs(receptance(80.0, 1e4))
     settings = "joint.friction=10", f"integration.step={step}", "excitation.steady=1e-9"
@@ -55,7 +55,7 @@ def test_a_rig_without_steady_state_fails(tmp_path):
 
 
 def test_a_rig_ages_in_steady_states(tmp_path):
-    """Without evolution all steady states are the same: cycles are energy over that of one."""
+    """Without evolution all steady states are equal, so cycles are energy over that of one."""
     loud = "excitation.force=200 N"
     summary = run(tmp_path, RIG, loud, "ageing={energy: 1 J, tolerance: 1e-3}", "energies=[0 J]")
     each = summary["states"][0]["energy_per_cycle"]
@@ -64,7 +64,7 @@ def test_a_rig_ages_in_steady_states(tmp_path):
 
 
 def test_a_blow_shows_the_frequency_response_of_a_stuck_rig(tmp_path):
-    """Against the exact accelerance, but for the step: the peak lies within one line."""
+    """It is the exact accelerance up to the step; the peak lies within one line."""
     summary = run(tmp_path, RIG, HAMMER, "joint.friction=10", "integration.step=50 us")
     state = summary["states"][0]
     assert abs(state["first_frequency"] - state["stuck"][0]) <= state["resolution"]
@@ -88,7 +88,7 @@ def test_a_blow_shows_the_frequency_response_of_a_stuck_rig(tmp_path):
 
 
 def test_states_without_a_ring_down_are_in_its_figure(tmp_path):
-    """Of a motion that was over at once the picture shows the motion."""
+    """A motion that is over at once is shown as the motion."""
     time = np.linspace(0.0, 1.0, 50)
     moved = np.exp(-5.0 * time) * np.cos(60.0 * time)
     with h5py.File(tmp_path / "results.h5", "w") as file:
@@ -109,7 +109,7 @@ def test_states_without_a_ring_down_are_in_its_figure(tmp_path):
 
 @pytest.mark.slow
 def test_wear_changes_the_response_to_a_blow(tmp_path):
-    """E is frozen in each record; figures of what there is are drawn."""
+    """E is frozen in each record; the available figures are drawn."""
     evolution = "evolution.stiffness={kind: table, energy: [0 J, 1 J], factor: [1, 2]}"
     summary = run(
         tmp_path,
@@ -131,7 +131,7 @@ def test_wear_changes_the_response_to_a_blow(tmp_path):
 
 @pytest.mark.slow
 def test_a_recorded_blow_moves_the_rig_as_a_hammer_does(tmp_path):
-    """Sampled 50 times: the second order of a polygon leaves 1e-3."""
+    """With 50 samples the second-order error of a polygon is 1e-3."""
     times = np.linspace(0.0, 1e-3, 51)
     rows = [f"{time},{100.0 * np.sin(np.pi * time / 1e-3)}" for time in times]
     folder = tmp_path / "recorded"
@@ -153,7 +153,7 @@ def test_a_recorded_blow_moves_the_rig_as_a_hammer_does(tmp_path):
 
 @pytest.mark.parametrize("kind", ["joint", slow("rig")])
 def test_what_new_writes_wears_without_a_warning(tmp_path, kind):
-    """All energies that it asks for are reached, and friction has risen between them."""
+    """All requested energies are reached, and friction rises between them."""
     summary = run(tmp_path, template(kind), "output.figures=false")
     assert summary["warnings"] == []
     assert [state["energy"] for state in summary["states"]][:2] == [0.0, 1e6]

@@ -1,4 +1,4 @@
-"""Two dimensions: a section against the slot it stands for, when it does, and who chooses it."""
+"""Tests of two dimensions: a section and the slot it represents, validity, and choice."""
 
 import json
 from dataclasses import replace
@@ -48,7 +48,7 @@ def run_case(path: Path, folder: Path, *overrides: str) -> Run:
 
 @pytest.fixture(scope="module")
 def plane(plane_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The section of the default dovetail, not to be changed."""
+    """Return the section of the default dovetail, which tests must not change."""
     run = run_case(plane_path, tmp_path_factory.mktemp("plane") / "out", *QUIET)
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
@@ -56,7 +56,7 @@ def plane(plane_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture(scope="module")
 def pictured(plane_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The same with its pictures."""
+    """Return the same run with its pictures."""
     run = run_case(plane_path, tmp_path_factory.mktemp("pictured") / "out")
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
@@ -66,7 +66,7 @@ def pictured(plane_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 def test_only_three_dimensions_need_rounded_ends(plane_path, tmp_path):
-    """A section is the same without them; in space, and for probes there, they are asked for."""
+    """A section is the same without them; in space, and for probes there, they are required."""
     path = tmp_path / "section.yaml"
     ends = ("end_width", "end_radius")
     lines = plane_path.read_text(encoding="utf-8").splitlines()
@@ -95,7 +95,7 @@ def test_a_section_meets_its_closed_forms(plane, plane_path):
 
 
 def test_flanks_wear_alike_and_by_their_energy(plane):
-    """Volume per length = α x energy, and what is worn off the strips is in the mesh."""
+    """Volume per length = α x energy, and the wear of the cells is in the mesh."""
     one, two = (plane.summary[name] for name in ("intrados", "extrados"))
     for key in ("depth_1", "volume_1", "energy"):
         assert one[key] == pytest.approx(two[key], rel=1e-4)
@@ -112,7 +112,7 @@ def test_results_are_per_length(plane):
 
 @pytest.mark.slow
 def test_only_what_a_section_has_is_warned_of(plane, plane_path, tmp_path):
-    """The coarse grid misses the peaks at the edges along the slot; slot ends there are none."""
+    """The coarse grid misses the peaks at the edges along the slot; there are no slot ends."""
     assert not any("end" in line.split() for line in plane.summary["warnings"])
     coarse = run_case(
         plane_path, tmp_path / "out", "contact.grid=[16, 32]", "wear.cycles=3e4", *QUIET
@@ -177,7 +177,7 @@ SIZE, ROWS = (4.0, 24.0), 49
 
 
 def history_of(profile):
-    """A face that carries ``profile`` of its nodes' y, evenly across, and slips by 2 and -1 µm."""
+    """Return a face with ``profile`` over its nodes' y, even across, that slips by 2 and -1 µm."""
     x, y = (np.linspace(-0.5 * s, 0.5 * s, n) for s, n in zip(SIZE, (5, ROWS), strict=True))
     nodes = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     index = np.arange(len(nodes)).reshape(5, ROWS)
@@ -196,7 +196,7 @@ def history_of(profile):
 
 
 def test_sections_are_forces_and_energies_per_length():
-    """p = 10 + y: P per length 4 (10 + y), Qx = -µP, energy µP Σ|Δs|, slip Σ|Δs|, all exact."""
+    """For p = 10 + y, P per length is 4 (10 + y), Qx = -µP, energy µP Σ|Δs|, all exact."""
     history = history_of(lambda y: 20.0 + y)
     transfer = FaceTransfer.between(history.interface, Grid.covering(SIZE, (7, 30)))
     rows = sections(transfer, history, 0, FRICTION)
@@ -224,7 +224,7 @@ def test_sections_add_up_to_the_resultants():
 
 @pytest.fixture(scope="module")
 def slot(small_path):
-    """Sources and stages of the small case, coarse, in three dimensions."""
+    """Return sources and stages of the small case, coarse, in three dimensions."""
     case = load_case(
         small_path, ["mesh.flank_nodes=[6, 8]", "mesh.size=12", "contact.grid=[24, 48]"]
     )
@@ -241,7 +241,7 @@ def slot(small_path):
 
 
 def test_uniformity_of_a_slot(slot):
-    """Both flanks alike; ends carry more than the middle; and what is said fits the numbers."""
+    """Both flanks are equal; ends carry more than the middle; the text fits the numbers."""
     source, stages, _ = slot
     flanks = uniformities(*slot)
     assert set(flanks) == {"intrados", "extrados"}
@@ -297,7 +297,7 @@ def test_sentence_of_a_uniform_slot():
 
 @pytest.fixture
 def dimension_only(monkeypatch):
-    """The other axes leave the case as it is."""
+    """Let the other axes leave the case unchanged."""
     monkeypatch.setattr(choosing, "AXES", ())
 
 
@@ -345,7 +345,7 @@ def test_skewed_slot_stays_in_space_unprobed(plane_path):
 
 @pytest.mark.slow
 def test_a_slot_rounded_far_in_stays_in_space(plane_path):
-    """Its middle carries what its ends do not: far more than the mean."""
+    """Its middle carries the load of its ends as well: far more than the mean."""
     decision = choose_dimension(auto(plane_path, "structure.end_width=20 mm"))
     assert decision.value == 3
     for flank in ("intrados", "extrados"):
@@ -365,7 +365,7 @@ def test_a_probe_that_fails_decides_nothing(plane_path, monkeypatch):
 
 @pytest.mark.usefixtures("dimension_only")
 def test_choice_is_kept_until_the_run_is_finished(plane_path, tmp_path):
-    """So a run that is interrupted and resumed still knows why."""
+    """A run that is interrupted and resumed therefore still has the reasons."""
     case, record = ANALYSIS.choose(auto(plane_path, "structure.skew=5 deg"))
     folder = OutputFolder(tmp_path / "out")
     folder.claim(case, force=False, resumable=True)
@@ -402,7 +402,7 @@ def test_run_writes_what_was_chosen_and_why(plane_path, tmp_path):
 
 
 def test_run_in_space_says_how_uniform_it_is(whole):
-    """The small case: its ends are rounded gently, its middle is nearly a section."""
+    """In the small case the ends are rounded gently, so the middle is nearly a section."""
     assert "choice" not in whole.summary
     for name in ("intrados", "extrados"):
         uniformity = Uniformity(**whole.summary[name]["uniformity"])
@@ -415,7 +415,7 @@ def test_run_in_space_says_how_uniform_it_is(whole):
 
 
 def in_the_middle(run: Run, name: str) -> dict[str, float]:
-    """P, Qx at peak load, mean slip and energy of a cycle, and worn depth, in mid-slot."""
+    """Return P, Qx at peak load, mean slip and energy of a cycle, and worn depth, in mid-slot."""
     case = load_case(run.folder / "case.yaml")
     source = structure_of(case).source(case)
     faces = {face.face.name: number for number, face in enumerate(source.faces)}
@@ -438,8 +438,10 @@ DIFFERENCES = {"P": 0.04, "Qx": 0.04, "slip": 0.01, "energy": 0.05, "depth": 0.0
 @pytest.mark.slow
 @pytest.mark.long
 def test_plane_strain_is_the_middle_of_the_slot(plane_path, tmp_path):
-    """Discretisation alike in both; what is left is the slot's ends, in the sense they must have:
-    the middle carries less than the mean."""
+    """Both have equal discretisation, so only the slot's ends differ, in the expected sense.
+
+    The middle carries less than the mean.
+    """
     alike = (
         "mesh.flank_nodes=[14, 24]",
         "mesh.size=7",

@@ -1,4 +1,4 @@
-"""Units: those known without pint are exactly what pint makes of them."""
+"""Units that are known without pint are exactly those of pint."""
 
 from itertools import product
 
@@ -22,7 +22,7 @@ WRITTEN = (
 
 
 def test_frequent_units_are_pints():
-    """Alone, to a power, in products and quotients: size to all digits of a number, dimension."""
+    """Alone, as powers, products and quotients, size (to all digits) and dimension agree."""
     names = list(units.FREQUENT)
     pairs = [f"{one}{sign}{other}" for one, other, sign in product(names, names, "*/")]
     for text in (*names, *(f"{name}^3" for name in names), *pairs, *WRITTEN):
@@ -58,7 +58,7 @@ def test_spaces_dots_and_superscripts(written, plain):
 
 @pytest.mark.parametrize("text", ["1 mm³/(N·m)", "1 mm^3/(N m)", "1 mm3/Nm", "1 um³/J", "1 N mm"])
 def test_they_need_no_pint(text, monkeypatch):
-    """Which takes half a second to load."""
+    """Loading pint would take half a second."""
     monkeypatch.setattr(units, "_by_pint", None)
     units._parse.cache_clear()
     assert units.to_base(text, None) > 0.0

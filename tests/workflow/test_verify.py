@@ -1,4 +1,4 @@
-"""``fretscale verify`` on the small case: its expectations are met, and a wrong one is missed."""
+"""Tests of ``fretscale verify`` on the small case: met expectations, and a missed one."""
 
 import re
 from pathlib import Path
@@ -23,7 +23,7 @@ def verify(path, out):
 
 
 def quiet(text):
-    """The case without its pictures."""
+    """Return the case without its pictures."""
     return text.replace("figures: true", "figures: false")
 
 
@@ -81,7 +81,7 @@ expect:
 def test_table_has_the_units_of_the_case_and_the_kind_of_each_value(
     small_path, tmp_path, monkeypatch, capsys
 ):
-    """Of a value 0 the error is in its unit too: 0.4 um, where 0.5 um are allowed."""
+    """The error of a value 0 has its unit too: 0.4 um, where 0.5 um are allowed."""
 
     def run_case(case, out, force, loudness):
         out.mkdir(parents=True)
@@ -102,7 +102,7 @@ def test_table_has_the_units_of_the_case_and_the_kind_of_each_value(
 
 
 def test_every_case_says_what_it_expects():
-    """All but the bodies of another one."""
+    """The only exception is a case that provides the bodies of another one."""
     without = {path.stem for path in CASES.glob("*.yaml") if not load_case(path).expect}
     assert without == {"specimens_rig"}
 

@@ -1,4 +1,4 @@
-"""Motions at chosen frequencies and harmonics, as a vibration case tells and writes them."""
+"""Tests of motions at chosen frequencies and harmonics of a vibration case."""
 
 import csv
 
@@ -14,7 +14,7 @@ FORCE, AT = 2.0, (75.0, 120.0)
 
 @pytest.fixture(scope="module")
 def stuck(tmp_path_factory):
-    """Folder and summary of a rig whose joint sticks."""
+    """Return folder and summary of a rig whose joint sticks."""
     folder = tmp_path_factory.mktemp("stuck")
     asked = ("at=[75 Hz, 120 Hz]", "harmonics_along_curves=true", "resolution.harmonics=2")
     return folder, run(folder, RIG, "joint.friction=10", "forces=[2 N]", *asked)
@@ -35,7 +35,7 @@ def test_answers_are_exactly_at_the_frequencies(stuck):
 
 
 def test_harmonics_are_those_of_the_closed_form(stuck):
-    """Of both masses, the joint's stretch and its force, at the frequencies and along the curve."""
+    """Both masses, the joint's stretch and its force agree, at frequencies and on the curve."""
     folder, summary = stuck
     with h5py.File(folder / "out" / "results.h5") as file:
         names = {name: file["names"][name][()].astype(str).tolist() for name in file["names"]}

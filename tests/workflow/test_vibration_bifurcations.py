@@ -1,4 +1,4 @@
-"""Bifurcations that cases tell, from the command: against integration in time on both sides."""
+"""Tests of bifurcations of cases from the command, against integration in time."""
 
 import json
 from typing import Any
@@ -59,7 +59,10 @@ def run(tmp_path: Any, text: str) -> tuple[dict[str, Any], str]:
 
 
 def sizes_each_period(frequency: float) -> Any:
-    """Of the mass with its absorber [mm], from rest, once a period of the last 100 of 700."""
+    """Return the motion of the mass with its absorber [mm], from rest, once a period.
+
+    It covers the last 100 of 700 periods.
+    """
     omega = 2.0 * np.pi * frequency
 
     def rates(time: float, y: Any) -> list[float]:
@@ -93,8 +96,11 @@ def test_motions_beyond_neimark_sacker_are_of_two_frequencies(tmp_path: Any) -> 
 
 
 def test_closed_branches_are_found_from_a_start(tmp_path: Any) -> None:
-    """The same motion, one, two and three periods of the force later, is another; the curve from
-    the ends of the frequencies has too few harmonics where it folds, and it is said."""
+    """The motion shifted by one, two or three periods of the force is another motion.
+
+    The curve from the ends of the frequencies has too few harmonics where it folds, and reports
+    this.
+    """
     summary, told = run(tmp_path, SUBHARMONIC)
     branches = summary["further_branches"]
     assert [branch["closed"] for branch in branches] == [True] * 3

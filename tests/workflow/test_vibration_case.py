@@ -1,4 +1,4 @@
-"""Vibration cases from the command line: linear limits, closed forms, mistakes, what they leave."""
+"""Tests of vibration cases from the command line: linear limits, closed forms, errors, files."""
 
 import csv
 
@@ -36,14 +36,14 @@ resolution: {harmonics: 1, samples: 4096}
 output: {figures: false}
 """
 STIFFNESS = 1e4
-# Of the solver, over a resonance of moderate damping.
+# Tolerance of the solver over a resonance of moderate damping.
 SOLVED = 1e-7
-# Half of the way to and fro is taken at 1024 times of a period: at most (π/1024)²/2 too small.
+# Half the peak-to-peak motion is taken at 1024 times of a period: at most (π/1024)²/2 too small.
 SAMPLED = 5e-6
 
 
 def curves(folder, number=0):
-    """The datasets of a force of a finished run."""
+    """Return the datasets of a force of a finished run."""
     with h5py.File(folder / "out" / "results.h5") as file:
         group = file[f"responses/{number:05d}"]
         return {name: item[()] for name, item in group.items() if isinstance(item, h5py.Dataset)}
@@ -79,7 +79,7 @@ def test_free_and_stuck_joints_leave_the_rig_linear(tmp_path, friction, held):
 
 
 def test_linear_limits_without_damping_have_their_peaks_beside_the_modes(tmp_path):
-    """At them there is no bound. A mode leaves f0 / 2 |f - f0| of what it would be at rest."""
+    """At the modes there is no bound: an amplitude is f0 / 2 |f - f0| times that at rest."""
     where = ("structure.damping_ratio=0", "joint.friction=0.001", "forces=[2 N]")
     summary = run(tmp_path, RIG, *where, "frequencies=[30 Hz, 40 Hz]")
     with h5py.File(tmp_path / "out" / "results.h5") as file:
@@ -94,7 +94,7 @@ def test_linear_limits_without_damping_have_their_peaks_beside_the_modes(tmp_pat
 
 
 def test_single_harmonic_of_one_mass_is_the_closed_form(tmp_path):
-    """Amplitude a under force F: |(k - m ω² + i c ω) a + cosine - i sine| = F."""
+    """Amplitude a under force F satisfies |(k - m ω² + i c ω) a + cosine - i sine| = F."""
     summary = run(tmp_path, ONE_MASS)
     law = Jenkins(1500.0, 0.5, 10.0, 30.0)
     damping = 2.0 * 0.02 * np.sqrt(800.0 * 2e-3)
@@ -225,7 +225,7 @@ def test_memory_grows_with_the_samples():
 
 @pytest.mark.slow
 def test_phase_resonance_follows_the_peaks(tmp_path):
-    """Half of the way from peak to peak; force and answer 90 degrees apart at the driven mass."""
+    """Amplitude is half peak to peak; force and response are 90° apart at the driven mass."""
     summary = run(tmp_path, RIG, "forces=[2 N, 20 N, 60 N]", "backbone=true", "mass=2")
     with h5py.File(tmp_path / "out" / "results.h5") as file:
         curve = {name: file[f"backbone/{name}"][()] for name in file["backbone"]}
@@ -238,7 +238,7 @@ def test_phase_resonance_follows_the_peaks(tmp_path):
 
 
 def test_motions_along_the_force_leave_the_linear_limit_where_the_joint_slips(tmp_path):
-    """From the stuck rig to the response of the largest force at the same frequency."""
+    """They lead from the stuck rig to the response of the largest force at that frequency."""
     summary = run(tmp_path, RIG, "forces=[2 N, 60 N]", "force_sweeps=[90 Hz]")
     (sweep,) = summary["force_sweeps"]
     assert (sweep["frequency"], sweep["folds"], sweep["message"]) == (90.0, [], "")
@@ -258,7 +258,7 @@ def test_motions_along_the_force_leave_the_linear_limit_where_the_joint_slips(tm
 
 
 def test_loops_of_the_joint_at_one_frequency(tmp_path):
-    """A slider's loop: its spring's slope, µN, and 4 µN (a - µN/kt) of energy."""
+    """A slider's loop has its spring's slope, µN, and an energy of 4 µN (a - µN/kt)."""
     run(tmp_path, RIG, "forces=[2 N, 60 N]", "loops={frequency: 60 Hz, harmonics: [1, 40]}")
     with h5py.File(tmp_path / "out" / "results.h5") as file:
         small, large = (dict(file[f"responses/0000{n}/loops/00001"].attrs) for n in (0, 1))

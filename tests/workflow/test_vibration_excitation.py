@@ -1,4 +1,4 @@
-"""What drives a vibration case: forces at places, records, the ground, an engine; and mistakes."""
+"""Tests of excitations of vibration cases: forces, records, the ground, an engine; and errors."""
 
 import csv
 
@@ -16,14 +16,14 @@ RECORD = "time [ms],force [N]\n5,0\n7,3\n10,-1\n12,4\n15,0\n"
 
 
 def responses_to(forces, order=1):
-    """Displacements ``(2,)`` of the stuck rig by amplitudes of forces of a harmonic."""
+    """Return displacements ``(2,)`` of the stuck rig by amplitudes of forces of a harmonic."""
     stiffness, damping = linear_rig(STIFFNESS)
     angular = 2.0 * np.pi * AT * order
     return np.linalg.solve(stiffness - angular**2 * MASS + 1j * angular * damping, forces)
 
 
 def answer(folder, *settings, joint=STUCK):
-    """The summary, its one motion, and its harmonics by order ``(2,)``."""
+    """Return the summary, its one motion, and its harmonics by order ``(2,)``."""
     summary = run(folder, RIG, joint, *FEW, *settings)
     (motion,) = summary["responses"][0]["at"][0]["motions"]
     with h5py.File(folder / "out" / "results.h5") as file:
@@ -54,7 +54,10 @@ def test_forces_with_phases_and_harmonics_superpose(tmp_path):
 
 @pytest.mark.parametrize("kind", ["displacement", "acceleration"])
 def test_the_ground_shakes_the_rig(tmp_path, kind):
-    """Relative and absolute, by M (x'' + x_g'') + C x' + K x = 0 with C and K of both to it."""
+    """Relative and absolute motions follow from M (x'' + x_g'') + C x' + K x = 0.
+
+    C and K contain the connections of both masses to the ground.
+    """
     squared = (2.0 * np.pi * AT) ** 2
     amplitude = 0.02 if kind == "displacement" else 0.02 * squared
     base = f"[{{kind: {kind}, amplitude: {amplitude}, phase: 40 deg}}]"
@@ -71,7 +74,7 @@ def test_the_ground_shakes_the_rig(tmp_path, kind):
 
 
 def test_a_record_is_the_sum_of_its_harmonics(tmp_path):
-    """Straight between rows: by quadrature of its turns. What is left out is told."""
+    """Straight lines between rows are integrated by turns; omitted parts are reported."""
     (tmp_path / "period.csv").write_text(RECORD, encoding="utf-8")
     records = "[{points: m2, file: period.csv, highest: 4}]"
     settings = f"excitation={{records: {records}, forces: []}}", "resolution.harmonics=1"
@@ -91,7 +94,7 @@ def test_a_record_is_the_sum_of_its_harmonics(tmp_path):
 
 
 def test_one_force_at_levels_is_what_forces_are(tmp_path):
-    """With friction, folds of harmonics and all: the same numbers."""
+    """The numbers agree with friction, folds and harmonics."""
     few = ("frequencies=[60 Hz, 140 Hz]", "resolution.harmonics=3")
     wanted = run(tmp_path / "forces", RIG, *few, "forces=[60 N]")
     excitation = "excitation={levels: [60], forces: [{points: m1, amplitude: 1 N}]}"
@@ -218,7 +221,7 @@ output: {figures: false, paraview: false}
 
 
 def two_masses(held=0.0):
-    """The rig of the other tests without its first spring; one that holds it inside if wanted."""
+    """Return the rig of the other tests without its first spring, optionally with an inner one."""
     none = np.zeros(0)
     stiffness = 200e3 * np.array([[1.0, -1.0], [-1.0, 1.0]]) + np.diag([held, 0.0])
     flat = np.zeros((2, 0))

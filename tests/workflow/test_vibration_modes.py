@@ -1,4 +1,4 @@
-"""Modes with joints over their amplitude, as a vibration case tells, draws and writes them."""
+"""Tests of amplitude-dependent modes with joints in a vibration case: reports and files."""
 
 import csv
 
@@ -18,7 +18,7 @@ ASKED = "modes={numbers: [1, 2], amplitudes: [0.2 um, 20 um]}"
 
 @pytest.fixture(scope="module")
 def sliding(tmp_path_factory):
-    """Folder and summary of a rig whose joint slides, under two forces."""
+    """Return folder and summary of a rig whose joint slides, under two forces."""
     folder = tmp_path_factory.mktemp("sliding")
     return folder, run(folder, RIG, "forces=[2 N, 60 N]", "backbone=true", LIGHT, ASKED)
 

@@ -1,4 +1,4 @@
-"""What a vibration case leaves: datasets, tables, figures and files for ParaView, true to it."""
+"""Tests of the output of a vibration case: datasets, tables, figures and ParaView files."""
 
 import csv
 import json
@@ -49,7 +49,7 @@ NAMES = {"frequency_response", "resonance", "loops", "node_shares", "node_states
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The output of a run, not to be changed."""
+    """Return the output of a run, which tests must not change."""
     scene = tmp_path_factory.mktemp("block")
     result = run_block(scene)
     assert result.exit_code == 0, result.output
@@ -70,7 +70,7 @@ def results(folder: Path) -> Iterator[h5py.File]:
 
 @pytest.fixture
 def changed(folder: Path, tmp_path: Path) -> Iterator[h5py.File]:
-    """A copy to change."""
+    """Return a copy that tests may change."""
     copy = tmp_path / "results.h5"
     copy.write_bytes((folder / "results.h5").read_bytes())
     with h5py.File(copy, "a") as file:
@@ -78,7 +78,7 @@ def changed(folder: Path, tmp_path: Path) -> Iterator[h5py.File]:
 
 
 def table(path: Path) -> dict[str, Array]:
-    """Columns of a CSV file by their headings."""
+    """Return the columns of a CSV file by their headings."""
     with path.open(encoding="utf-8", newline="") as file:
         header, *rows = csv.reader(file)
     return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
@@ -248,7 +248,7 @@ def test_rising_branch_starts_where_the_motion_turns() -> None:
 
 
 def test_states_have_the_symmetry_of_the_block(results: h5py.File) -> None:
-    """Nodes at y and -y move alike; those at -x do so half a cycle later."""
+    """Nodes at y and -y move equally; those at -x do so half a cycle later."""
     numbers = rows_and_columns(*places().T)
     assert numbers is not None
     for response in results["responses"].values():
@@ -259,7 +259,7 @@ def test_states_have_the_symmetry_of_the_block(results: h5py.File) -> None:
 
 
 def test_states_are_those_of_the_forces(results: h5py.File) -> None:
-    """By Coulomb's law, from the forces of the cycle at resonance."""
+    """They follow Coulomb's law, from the forces of the cycle at resonance."""
     for response in results["responses"].values():
         force, state = response["resonance/force"][()], response["resonance/state"][()]
         pressed, pulled = force[..., 2], np.hypot(force[..., 0], force[..., 1])
@@ -310,7 +310,7 @@ def test_what_should_be_there_and_is_not_is_an_error(changed: h5py.File) -> None
 
 
 def series(folder: Path, number: int = 1) -> tuple[list[float], list[Any]]:
-    """Times and meshes of a cycle."""
+    """Return times and meshes of a cycle."""
     reader = pv.PVDReader(folder / "paraview" / f"cycle_{number:05d}.pvd")
     meshes = []
     for time in reader.time_values:
@@ -342,7 +342,7 @@ def test_paraview_plays_a_cycle(folder: Path, results: h5py.File) -> None:
 
 @pytest.mark.parametrize("count", [1, 32, 48, 49, 64, 97, 128, 256, 360, 1000])
 def test_a_cycle_is_played_evenly(count: int) -> None:
-    """All samples or every so many, the last step as long as the others where that can be."""
+    """All samples or every nth are shown, with an equal last step where possible."""
     shown = shown_samples(count)
     assert shown[0] == 0
     assert min(count, MOST_STEPS) / 2 < len(shown) <= MOST_STEPS
@@ -352,7 +352,7 @@ def test_a_cycle_is_played_evenly(count: int) -> None:
 
 
 def test_friction_takes_energy_from_the_upper_body(folder: Path, results: h5py.File) -> None:
-    """Work of the force on body 2 along its motion is what the nodes lose, less its sampling."""
+    """Work of the force on body 2 is what the nodes lose, within the sampling error."""
     _, meshes = series(folder)
     moved, pulled = (
         np.array([mesh.point_data[name] for mesh in meshes], dtype=float)

@@ -1,4 +1,4 @@
-"""A case of one sector of a ring: against all sectors put together here; and what is refused."""
+"""Tests of one sector of a ring, against all sectors assembled here; and of refusals."""
 
 import csv
 
@@ -36,13 +36,13 @@ BLADES = (CASES / "ring_of_blades.yaml").read_text(encoding="utf-8").partition("
 
 
 def node(number):
-    """Where the nodes of the rim are, two a sector: the cut ones bulge."""
+    """Return the position of a rim node, two per sector; the cut ones bulge."""
     radius = 100.0 if number % 2 == 0 else 90.0
     return radius * np.array([np.cos(0.5 * number * TURN), np.sin(0.5 * number * TURN)])
 
 
 def rods(ends, count, held):
-    """Stiffness of rods between nodes, by number and place; and of what holds all nodes."""
+    """Return the stiffness of rods between nodes, by number and place, and of all supports."""
     stiffness = np.kron(np.diag(held), 300.0 * np.eye(2))
     for one, other in ends:
         along = node(other) - node(one)
@@ -56,7 +56,7 @@ def rods(ends, count, held):
 
 @pytest.fixture
 def rim(tmp_path):
-    """A folder with the matrices of a sector, and those of the whole ring."""
+    """Return a folder with the matrices of a sector, and the matrices of the whole ring."""
     np.savez(
         tmp_path / "rim.npz",
         K=rods([(0, 1), (1, 2)], 3, [0.5, 1.0, 0.5]),
@@ -69,7 +69,7 @@ def rim(tmp_path):
 
 
 def test_a_sector_between_cut_faces_moves_as_in_the_whole_ring(rim):
-    """In axes that do not turn, joints stuck: natural frequencies, and the motion at one."""
+    """Natural frequencies and a forced motion agree in fixed axes with stuck joints."""
     folder, stiffness = rim
     summary = run(folder, RIM)
     every = np.sqrt(np.linalg.eigvalsh(stiffness / 1e-3)) / (2.0 * np.pi)

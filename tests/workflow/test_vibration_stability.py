@@ -1,4 +1,4 @@
-"""Stability in vibration cases: columns, bifurcations, dashed curves, further branches."""
+"""Tests of stability in vibration cases: columns, bifurcations, dashed curves, branches."""
 
 import json
 import tracemalloc
@@ -44,7 +44,7 @@ def run(tmp_path: Any, text: str) -> dict[str, Any]:
 
 
 def test_a_further_branch_is_found_with_its_fold_and_drawn_dashed(tmp_path: Any) -> None:
-    """From 300 Hz down the small motions are met; the large and the unstable ones hang together."""
+    """Descending from 300 Hz finds small motions; large and unstable ones are connected."""
     summary = run(tmp_path, CASE)
     assert [response["unstable_points"] for response in summary["responses"]] == [0, 0]
     (branch,) = summary["further_branches"]
@@ -111,7 +111,7 @@ def test_a_stop_without_even_harmonics_is_doubted(tmp_path: Any) -> None:
 
 
 def test_a_body_that_contacts_alone_hold_takes_little_memory() -> None:
-    """As many rows as increments times contacts tell what holds it."""
+    """As many rows as increments times contacts determine the holding forces."""
     rig = block()
     law = FrictionContact(1.8e3, 2.3e3, 0.5, gap=rig.gap)
     load = PeriodicLoad({1: -1j * rig.driven}, 60.0 * rig.pressing)

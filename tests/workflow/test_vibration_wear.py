@@ -1,4 +1,4 @@
-"""A rig that wears its own contact: limits, balances, independent checks, mistakes, files."""
+"""Tests of a rig that wears its own contact: limits, balances, independent checks, files."""
 
 import csv
 import json
@@ -81,7 +81,7 @@ def refusal(folder, *settings, wear=WEAR):
 
 
 def driven(rig):
-    """By a sine of 1 N on what the case drives."""
+    """Drive the rig by a sine of 1 N at the point of the case."""
     return Driving(PeriodicLoad({1: -1j * rig.driven}))
 
 
@@ -101,7 +101,7 @@ def worn(contact, cycles, tolerance=0.1):
 
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory):
-    """The small case from start to end, not to be changed."""
+    """Return a complete run of the small case, which tests must not change."""
     folder = tmp_path_factory.mktemp("rig")
     result = run(folder)
     assert result.exit_code == 0, result.output
@@ -115,7 +115,7 @@ def summary(ended):
 
 @pytest.mark.slow
 def test_friction_that_grows_within_a_few_cycles_is_followed(tmp_path):
-    """The paper's friction grows fivefold in ten cycles: against one cycle after the other."""
+    """The paper's friction grows fivefold in ten cycles; the reference goes cycle by cycle."""
     law = "evolution: {energy: [0 J, 1 mJ, 10 mJ, 0.1 J], factor: [1, 2, 2.5, 3]}"
     wear = WEAR.replace("evolution: {energy: [0 J, 10 J], factor: [1, 2]}", law)
     assert wear != WEAR
@@ -178,7 +178,7 @@ def test_the_loop_is_that_of_the_whole_tangential_problem(tmp_path):
 
 @pytest.mark.parametrize("tilt", ["held", "free"])
 def test_joint_wear_and_loop_tilt_alike(tilt, tmp_path):
-    """On a ball with a slope, either all three of them or none."""
+    """On a ball with a slope, either all three of them tilt or none."""
     x, y = np.meshgrid(*[(np.arange(16) - 7.5) * 0.9 / 16] * 2, indexing="ij")
     np.save(tmp_path / "gap.npy", (x**2 + y**2) / 80.0 + 3e-3 * np.maximum(x, 0.0))
     structure = next(line for line in WEAR.splitlines() if line.startswith("structure"))
@@ -208,7 +208,7 @@ def test_the_volume_is_that_of_the_dissipated_energy(summary):
 
 
 def test_energy_adds_up_from_cycle_to_cycle(tmp_path):
-    """Wear dissipates what the motions on the way do: Simpson's rule over their energies."""
+    """Wear dissipates the energy of the intermediate motions, by Simpson's rule."""
     _, contact = contact_in_rig(tmp_path)
     cycles, energies, spent = np.linspace(0.0, 4000.0, 5), [], []
     state = contact.unworn()
@@ -376,7 +376,7 @@ def test_the_worn_contact_is_shown_in_paraview(tmp_path):
 
 @pytest.mark.slow
 def test_an_excitation_of_one_force_wears_as_that_force(tmp_path):
-    """At the level by which the force is divided."""
+    """They agree at the level by which the force is divided."""
     few = ("wear.cycles=[20]", "frequencies=[60 Hz, 140 Hz]")
     by_force, by_level = tmp_path / "force", tmp_path / "level"
     wanted, found = (
@@ -403,7 +403,7 @@ def test_an_excitation_of_one_force_wears_as_that_force(tmp_path):
 
 
 def _ended(folder, *settings):
-    """The summary of a run of the small case."""
+    """Return the summary of a run of the small case."""
     folder.mkdir()
     result = run(folder, *settings)
     assert result.exit_code == 0, result.output

@@ -1,4 +1,4 @@
-"""Scripts that show a run, in ParaView itself where it is installed."""
+"""Tests of scripts that show a run, in ParaView itself where it is installed."""
 
 import os
 import shutil
@@ -25,10 +25,10 @@ pytestmark = [
 
 @pytest.fixture
 def screen() -> Iterator[str]:
-    """A screen in memory: its server takes a free number itself, and says it when it is ready.
+    """Start a screen in memory, whose server takes a free number and reports it when ready.
 
-    Without `-noreset` the server starts anew when its last window closes, and refuses whom it finds
-    at the door meanwhile: ParaView opens a window to ask what can be drawn before its own.
+    Without `-noreset` the server restarts when its last window closes, and refuses connections
+    meanwhile: ParaView opens a test window before its own.
     """
     told, tells = os.pipe()
     command = ["Xvfb", "-displayfd", str(tells), "-noreset", "-nolisten", "tcp"]
@@ -43,7 +43,7 @@ def screen() -> Iterator[str]:
 
 @pytest.mark.parametrize("script", ["view", "view_mission"])
 def test_paraview_draws_every_view(results: Path, tmp_path: Path, screen: str, script: str) -> None:
-    """From another folder than that of the script, and after the run has been moved."""
+    """It works from another folder than that of the script, and after the run has been moved."""
     assert ANALYSIS.pictures is not None
     write_paraview(ANALYSIS.pictures, CONTENTS, results, tmp_path / "run" / "paraview")
     (tmp_path / "run").rename(tmp_path / "moved run")

@@ -1,4 +1,4 @@
-"""Wear laws as a case gives them: one or two, constant or changing with energy; mission mixes."""
+"""Tests of wear laws in cases: one or two, constant or changing with energy; mission mixes."""
 
 import json
 
@@ -18,13 +18,13 @@ AMPLITUDE = "{law: energy_amplitude, coefficient: 3e4 um^3/J}"
 
 
 def laws(path, *overrides):
-    """Laws of body 1 and body 2 of the dovetail."""
+    """Return the laws of body 1 and body 2 of the dovetail."""
     case = load_case(path, overrides)
     return tuple(case.wear_of(number).described() for number in (1, 2))
 
 
 def refused(path, *overrides):
-    """The line that refuses a case."""
+    """Return the line that refuses a case."""
     with pytest.raises(CaseError) as refusal:
         load_case(path, overrides)
     (line,) = str(refusal.value).splitlines()
@@ -42,7 +42,7 @@ def test_both_bodies_wear_by_the_law_of_the_section(dovetail_path):
 
 @pytest.mark.parametrize("law", ["energy", "archard", "energy_amplitude"])
 def test_a_body_may_name_its_own_law(dovetail_path, law):
-    """Whatever the law of the section, which then is that of the other body."""
+    """The law of the section is then that of the other body, whatever it is."""
     needed = {"archard": ["wear.blade.coefficient=1e-4", "wear.blade.hardness=4 GPa"],
               "energy_amplitude": ["wear.reference_amplitude=75 um"]}  # fmt: skip
     blade = {
@@ -59,7 +59,7 @@ def test_a_body_may_name_its_own_law(dovetail_path, law):
     "written", ["3e-5 mm^3/(N*m)", "3e-5 mm³/(N·m)", "3e-5 mm^3/(N m)", "3e-5 mm3/Nm", "3e-8 1/MPa"]
 )
 def test_archard_takes_the_specific_wear_rate(dovetail_path, written):
-    """k = V / (P s) = K / H, whatever it is written in."""
+    """The entry k = V / (P s) = K / H is accepted in any unit."""
     entry = f"wear.disk={{law: archard, specific_wear_rate: {written}}}"
     law, _ = laws(dovetail_path, entry)
     assert law.coefficient / law.hardness == pytest.approx(3e-8, rel=1e-15)
@@ -187,7 +187,7 @@ def test_friction_follows_its_table(dovetail_path):
 
 
 def test_schema_takes_bodies_with_and_without_a_law():
-    """Of several laws that a body without one may have, any will do."""
+    """A body without a law accepts the entries of any of several laws."""
     schema = json.loads(json.dumps(json_schema()))
     body = schema["$defs"]["DovetailWear"]["properties"]["disk"]
     assert len(body["anyOf"]) == 3

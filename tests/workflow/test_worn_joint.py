@@ -1,4 +1,4 @@
-"""A joint that follows the wear of its contact, computed before it: from half-space to loop."""
+"""Tests of a joint that follows the wear of its contact, computed before it."""
 
 import json
 from types import SimpleNamespace
@@ -53,7 +53,7 @@ def run(folder, wear, joint=JOINT):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The folder of a finished run."""
+    """Return the folder of a finished run."""
     folder = tmp_path_factory.mktemp("worn")
     ended = run(folder, WEAR)
     assert ended.exit_code == 0, ended.output
@@ -80,7 +80,7 @@ def test_stiffness_and_friction_of_the_joint_are_those_of_the_worn_contact(folde
 
 
 def test_a_run_that_was_broken_off_takes_its_finished_wear(folder):
-    """In the same files, and to the same end."""
+    """The resumed run ends with the same files."""
     summary, wear = (folder / "out" / name / "summary.json" for name in ("", "wear"))
     finished, first = wear.stat().st_mtime_ns, json.loads(summary.read_text())
     summary.unlink()

@@ -1,4 +1,4 @@
-"""Worn surfaces back to the nodes of the user's mesh."""
+"""Tests of the transfer of worn surfaces to the nodes of the user's mesh."""
 
 import numpy as np
 import pytest
@@ -18,13 +18,13 @@ from workflow.case.input_files import InputFileError
 
 
 def bowl(grid: Grid) -> np.ndarray:
-    """A depth that wears off towards the rim [mm]."""
+    """Return a depth that decreases towards the rim [mm]."""
     x, y = grid.x / (0.5 * grid.size[0]), grid.y / (0.5 * grid.size[1])
     return 0.02 * (1.0 - 0.8 * x**2) * (1.0 - 0.5 * y**2) * (1.0 + 0.3 * x)
 
 
 def nodes_over(size: tuple[float, float], shape: tuple[int, int], frame: Frame) -> np.ndarray:
-    """Global points of a mesh of nodes over a face, in no order."""
+    """Return global points of a mesh of nodes over a face, in no order."""
     axes = [np.linspace(-0.5, 0.5, n) * s for n, s in zip(shape, size, strict=True)]
     x, y = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
     local = np.stack([x, y, 0.0 * x], axis=1)
@@ -41,7 +41,7 @@ FACES = {
 
 @pytest.mark.parametrize(("size", "shape"), FACES.values(), ids=FACES)
 def test_worn_volume_is_kept_where_nodes_cover_it(size, shape):
-    """To rounding, on coarse and on fine meshes."""
+    """The volume is conserved to rounding, on coarse and on fine meshes."""
     frame, depth = flank(), bowl(AREA_GRID)
     nodal = nodal_depths(nodes_over(size, shape, frame), frame, AREA_GRID, depth)
     assert nodal.volume_share == pytest.approx(1.0, abs=1e-12)
@@ -51,7 +51,7 @@ def test_worn_volume_is_kept_where_nodes_cover_it(size, shape):
 
 @pytest.mark.parametrize(("size", "shape"), FACES.values(), ids=FACES)
 def test_shared_areas_are_exact(size, shape):
-    """Of the cells, of the nodes, and their first moments: integrals of linear functions."""
+    """Areas and first moments agree for cells and nodes: integrals of linear functions."""
     frame, cell = Frame(np.zeros(3), np.eye(3)), AREA_GRID.cell_area
     points = nodes_over(size, shape, frame)[:, :2]
     # Nodes inside are moved about, so that triangles have any shape.
@@ -78,7 +78,7 @@ def test_even_wear_stays_even():
 
 
 def test_half_a_face_carries_half_the_wear():
-    """Nodes that cover half of what is worn say so."""
+    """Nodes that cover half of the worn area are reported as such."""
     frame = flank()
     points = nodes_over((SIZE[0], 0.5 * SIZE[1]), (8, 13), frame)
     moved = points + 0.25 * SIZE[1] * frame.axes[1]
@@ -113,7 +113,7 @@ def test_unworn_surfaces_stay():
 
 
 def test_both_bodies_move_into_themselves():
-    """Away from each other: the gap along z of the frame opens by the sum of the depths."""
+    """The gap along z of the frame opens by the sum of the depths."""
     frame, depth = flank(), np.array([0.01, 0.02])
     one, two = (worn_displacement(depth, frame, body) for body in (1, 2))
     np.testing.assert_allclose((two - one) @ frame.axes[2], 2.0 * depth, rtol=1e-14)

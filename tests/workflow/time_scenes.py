@@ -1,4 +1,4 @@
-"""Joints and rigs in time that more than one test module runs."""
+"""Joints and rigs in time that several test modules run."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 
 from tests.workflow.conftest import invoke
 
-# What closed forms and marched cycles leave: rounding.
+# Tolerance for the rounding of closed forms and marched cycles.
 ROUNDING = 1e-12
 
 JOINT = """\
@@ -40,7 +40,7 @@ HAMMER = (
 
 
 def run(folder: Path, text: str, *overrides: str):
-    """The summary of a run of a case."""
+    """Return the summary of a run of a case."""
     folder.mkdir(exist_ok=True)
     (folder / "case.yaml").write_text(text, encoding="utf-8")
     settings = [part for override in overrides for part in ("--set", override)]
@@ -50,7 +50,7 @@ def run(folder: Path, text: str, *overrides: str):
 
 
 def refused(folder: Path, text: str, *overrides: str) -> tuple[int, str]:
-    """Exit code and message of a run that fails."""
+    """Return exit code and message of a run that fails."""
     (folder / "case.yaml").write_text(text, encoding="utf-8")
     settings = [part for override in overrides for part in ("--set", override)]
     ended = invoke("run", folder / "case.yaml", "--out", folder / "out", *settings)
@@ -58,7 +58,7 @@ def refused(folder: Path, text: str, *overrides: str) -> tuple[int, str]:
 
 
 def linear_rig(joint_stiffness: float) -> tuple[np.ndarray, np.ndarray]:
-    """Stiffness with the joint as a spring, and damping of the modes without it."""
+    """Return the stiffness with the joint as a spring, and the damping of the modes without it."""
     squares, shapes = np.linalg.eig(np.linalg.solve(MASS, STIFF))
     shapes = shapes / np.sqrt(np.einsum("im,ij,jm->m", shapes, MASS, shapes))
     moved = MASS @ shapes
@@ -67,7 +67,7 @@ def linear_rig(joint_stiffness: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def receptance(frequency: float, joint_stiffness: float) -> np.ndarray:
-    """Displacements of both masses under 1 N on the first."""
+    """Return the displacements of both masses under 1 N on the first."""
     stiffness, damping = linear_rig(joint_stiffness)
     angular = 2.0 * np.pi * frequency
     matrix = stiffness - angular**2 * MASS + 1j * angular * damping

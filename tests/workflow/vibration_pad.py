@@ -1,7 +1,7 @@
-"""A vibration case on a small pad, run in seconds: a block on 5 x 5 friction contacts.
+"""Vibration case on a small pad, run in seconds: a block on 5 x 5 friction contacts.
 
 The block is pressed on a crowned pad, so that its corners are open, and rocks when it is driven
-above the pad: nodes stick, slip and lift off. It stands in for the two specimens of a rig.
+above the pad: nodes stick, slip and lift off. It replaces the two specimens of a rig.
 """
 
 from pathlib import Path
@@ -50,14 +50,14 @@ backbone: true
 
 
 def places() -> Array:
-    """Nodes of the pad ``(j, 2)``."""
+    """Return the positions of the nodes of the pad ``(j, 2)``."""
     line = np.linspace(-0.5 * SIDE, 0.5 * SIDE, ROWS)
     x, y = np.meshgrid(line, line, indexing="ij")
     return np.stack([x.ravel(), y.ravel()], axis=1)
 
 
 def block() -> RigModel:
-    """The block: x, y, z (upward) and its rotation about y, driven along x and a little along y."""
+    """Return the block: x, y, z (up), rotation about y; driven along x and a little along y."""
     x, y = places().T
     mass = np.diag([MASS, MASS, MASS, INERTIA])
     stiffness = np.diag([SPRING, SPRING, 0.0, ROCKING_SPRING])
@@ -84,7 +84,7 @@ def block() -> RigModel:
 
 
 def run_block(folder: Path, *overrides: str, rig: RigModel | None = None) -> Result:
-    """Run the case into ``folder/out``, the block in place of the specimens."""
+    """Run the case into ``folder/out``, with the block in place of the specimens."""
     path = folder / "case.yaml"
     path.write_text(CASE, encoding="utf-8")
     (folder / "block.yaml").write_text(template("specimens"), encoding="utf-8")

@@ -1,1 +1,1 @@
-"""What figures and files for ParaView are made with, whatever they show."""
+"""Common parts of the figures and ParaView files of all analyses."""

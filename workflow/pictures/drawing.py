@@ -1,15 +1,14 @@
 """Pictures of a run: figures, and files for ParaView.
 
-Each is told what the results hold, and reads ``results.h5`` and nothing else: numbers in the titles
-come from the data. A dataset that should be there and is not is an error. Images are 1200 pixels
-wide.
+Each picture is given the contents of the results and reads only ``results.h5``: numbers in the
+titles come from the data. A missing dataset is an error. Images are 1200 pixels wide.
 
-In files for ParaView the name of every array ends in its unit, as ``pressure [MPa]``. All lengths
-are in mm, worn depths too, so that Warp By Vector with a factor of 1 is true to scale. Vectors and
-stresses have components along the global axes, so that glyphs point the right way, but for those
-whose names begin with ``face_``: these are along the axes of the contact face. What is not known is
-left out, not drawn as NaN. Fields are single precision, which halves the files: the doubles are in
-``results.h5``.
+In files for ParaView the name of every array ends with its unit, as in ``pressure [MPa]``. All
+lengths, including worn depths, are in mm, so that Warp By Vector with a factor of 1 is true to
+scale. Vectors and stresses have components along the global axes, so that glyphs point the right
+way; the exception are arrays whose names begin with ``face_``, which have components along the axes
+of the contact face. Unknown values are left out instead of drawn as NaN. Fields have single
+precision, which halves the size of the files; ``results.h5`` has double precision.
 """
 
 from __future__ import annotations
@@ -42,11 +41,11 @@ def write_pictures(
 ) -> dict[str, str]:
     """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
-    ``contents`` is what the results hold, as ``pictures`` are told it. Each picture is ``isolated``
-    from the others and from the run: one that fails is left out. A process ``beside`` this
-    one has a ``share`` of the work, and ``progress`` is told what is done. Returns the figures as
-    SVG texts by their names, in the order in which they are to be looked at, if they are to go into
-    a report.
+    ``contents`` describes the results for ``pictures``. Each picture is ``isolated`` from the
+    others and from the run, so that one that fails is left out. A worker process ``beside`` this
+    one does a ``share`` of the work, and ``progress`` is called with what is done. Returns the
+    figures for the report, if the case asks for one: SVG texts by their names, in the order of
+    presentation.
     """
     formats, told = output.figure_formats, (pictures, contents, folder.results)
     names = tuple(pictures().figures_of(contents)) if formats else ()
@@ -74,7 +73,7 @@ def write_pictures(
 def load_what_draws(
     pictures: Callable[[], Pictures], output: Output, share: Share = "pictures"
 ) -> None:
-    """Do beforehand what a process begins to draw with: two seconds of imports."""
+    """Import the plotting libraries in advance, which takes two seconds."""
     pictures()
     if share == "pictures":
         from workflow.pictures import style  # noqa: F401
@@ -91,7 +90,7 @@ def _write_figure(
     formats: Sequence[str],
     keep: bool,
 ) -> str:
-    """One figure, which is returned as SVG if it is to ``keep``."""
+    """Write one figure, and return it as SVG if ``keep`` is true."""
     vectors: dict[str, str] = {}
     write_figures(pictures, contents, results, folder, [name], formats, vectors if keep else None)
     return vectors.get(name, "")
@@ -100,7 +99,7 @@ def _write_figure(
 def write_paraview(
     pictures: Callable[[], Pictures], contents: Any, results: Path, folder: Path
 ) -> list[Path]:
-    """Write the files that show ``results`` in ParaView; returns their paths.
+    """Write the files that show ``results`` in ParaView; return their paths.
 
     Every file appears under its name only when it is complete.
     """
@@ -120,12 +119,12 @@ def write_figures(
     formats: Sequence[str] = ("png",),
     vectors: dict[str, str] | None = None,
 ) -> list[Path]:
-    """Draw the figures of ``results`` (a ``results.h5``) as files; returns their paths.
+    """Draw the figures of ``results`` (a ``results.h5``) as files; return their paths.
 
-    Those of some ``names``, all of them unless these are given. For ``formats`` and ``vectors`` see
-    :func:`workflow.pictures.style.write_figures`.
+    Only the figures named in ``names`` are drawn, or all by default. For ``formats`` and
+    ``vectors`` see :func:`workflow.pictures.style.write_figures`.
     """
-    # Plots take a second to load: where they are drawn.
+    # Imported here because the plotting library takes a second to load.
     from workflow.pictures import style
 
     figures = pictures().figures_of(contents)
@@ -137,7 +136,7 @@ def write_figures(
 def vector_figures(
     pictures: Callable[[], Pictures], contents: Any, results: Path
 ) -> dict[str, str]:
-    """The figures of ``results`` as SVG texts by their names; nothing is written."""
+    """Return the figures of ``results`` as SVG texts by their names, without writing files."""
     vectors: dict[str, str] = {}
     write_figures(pictures, contents, results, results.parent, formats=(), vectors=vectors)
     return vectors

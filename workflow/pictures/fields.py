@@ -13,35 +13,35 @@ from sa_solver.types import Array, Grid
 from workflow.pictures.panels import WIDTH_INCHES, new_figure
 from workflow.pictures.style import COLOUR_MAP
 
-# Edge peaks are a few cells: a scale that reached them would leave the rest in one colour.
+# Edge peaks cover few cells; a colour scale up to them would show the rest in one colour.
 MAP_PERCENTILE = 99.5
-# More profiles than this overlap.
+# Largest number of profiles in a panel; more would overlap.
 MAX_PROFILES = 6
-# Nodes this close to the nearest row count as on the line, as a share of the face: less than half
-# the rows of a mesh of 34 nodes, enough for rows that are not quite straight.
+# Nodes within this share of the face from the nearest row count as on the line. It is less than
+# half the row distance of a mesh with 34 rows, and enough for rows that are not quite straight.
 ROW_SHARE = 0.01
-# Beyond what is in contact, how far maps and profiles reach: as a share of its size.
+# Margin of maps and profiles around the contact, relative to its size.
 MARGIN, PROFILE_MARGIN = 0.08, 0.15
-# From so many times as long along y on, a map has y to the right: x is there by habit.
+# Ratio of the lengths along y and x above which a map has y to the right; otherwise x is.
 LONGER = 1.25
-# Maps at most so high, over their width, and so many of them lie below each other.
+# Largest ratio of height to width, and largest number, of maps that are placed below each other.
 FLAT, MOST_STACKED = 0.3, 8
-# Over the width, what a map's height is at least: along lower ones no numbers could be read.
+# Smallest ratio of height to width of a map; the numbers along a flatter one would be illegible.
 FLATTEST = 0.08
-# Around and between maps, for axes and colour bar; for titles, of several lines where maps are
-# beside each other; and the highest of a map [inches].
+# Space around and between maps for axes and colour bar, and the largest height of a map; space for
+# titles, which have several lines where maps are next to each other [inches].
 BESIDE, BETWEEN, AROUND, HIGHEST = 2.6, 0.5, 1.3, 4.8
 TITLE, LONG_TITLE = 0.55, 0.75
 # Width of colour bars [inches].
 BAR = 0.3
-# Numbers along the sides of maps.
+# Number of tick labels along a side of a map.
 TICKS = 5
-# Views that fill so much of what they cover together are one.
+# Views become one common view if each fills this share of it.
 ALIKE = 0.7
 
 
 class View(NamedTuple):
-    """Part of a face that is shown: ends along x and along y [mm]."""
+    """Visible part of a face: its ends along x and along y [mm]."""
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -53,18 +53,18 @@ class View(NamedTuple):
 
 
 class Map(NamedTuple):
-    """A field ``(nx, ny)`` on a grid, and what is said above it."""
+    """Field ``(nx, ny)`` on a grid, with its title."""
 
     title: str
     field: Array
     grid: Grid
 
 
-# --- what is shown ------------------------------------------------------------------------------
+# --- views --------------------------------------------------------------------------------------
 
 
 def view_of(fields: Sequence[Array], grid: Grid, margin: float = MARGIN) -> View:
-    """Where any of the fields is above 0, with a margin; all of the grid where none is."""
+    """Return the region where any field is above 0, with a margin, or else the whole grid."""
     there = np.any([field > 0.0 for field in fields], axis=0)
     ends = []
     for direction in (0, 1):
@@ -78,7 +78,7 @@ def view_of(fields: Sequence[Array], grid: Grid, margin: float = MARGIN) -> View
 
 
 def common_views(views: Sequence[View]) -> list[View]:
-    """The one view that covers all, as often, where they are alike; else as they are."""
+    """Return one view that covers all, repeated, if the views are similar; else return them."""
     together = View(
         *((min(ends)[0], max(end for _, end in ends)) for ends in zip(*views, strict=True))
     )
@@ -87,7 +87,7 @@ def common_views(views: Sequence[View]) -> list[View]:
 
 
 def is_upright(views: Sequence[View]) -> bool:
-    """Whether y is to go to the right, x up: where faces are longer along y."""
+    """Return whether maps have y to the right and x up, because the faces are longer along y."""
     return max(view.size[1] / view.size[0] for view in views) > LONGER
 
 
@@ -95,10 +95,10 @@ def is_upright(views: Sequence[View]) -> bool:
 
 
 def draw_maps(title: str, rows: Sequence[Sequence[Map]], label: str, note: str) -> Figure:
-    """Maps on one colour scale and to scale, cut to where they are above 0; a row is of one face.
+    """Draw maps to scale on one colour scale, cut to where they are above 0; a row for each face.
 
-    Their longer side is to the right; flat ones lie below each other, and very flat ones are drawn
-    higher than they are. Those of nothing are left out, if not all are.
+    Their longer side is horizontal. Flat maps are placed below each other, and very flat ones are
+    drawn higher than to scale. Maps without values above 0 are left out, unless all are such.
     """
     own = [view_of([shown.field for shown in row], row[0].grid) for row in rows]
     views = common_views(own)
@@ -126,13 +126,13 @@ def draw_maps(title: str, rows: Sequence[Sequence[Map]], label: str, note: str) 
 
 
 def colour_bar(figure: Figure, colours: Any, axes: Any, label: str, **look: Any) -> None:
-    """A colour bar to the right of panels, of one width however high they are."""
+    """Draw a colour bar to the right of panels, with the same width whatever their height."""
     aspect = figure.get_figheight() / BAR
     figure.colorbar(colours, ax=axes, label=label, pad=0.01, aspect=aspect, **look)
 
 
 def scaled_panels(title: str, heights: Sequence[float], columns: int) -> tuple[Figure, Any]:
-    """A figure of panels to scale, a row for each of their ``heights`` over width; and its axes."""
+    """Return a figure and its axes, with a row of panels for each ratio of height to width."""
     width = (WIDTH_INCHES - BESIDE - BETWEEN * (columns - 1)) / columns
     inches = [min(width * height, HIGHEST) for height in heights]
     above = TITLE if columns == 1 else LONG_TITLE
@@ -142,7 +142,7 @@ def scaled_panels(title: str, heights: Sequence[float], columns: int) -> tuple[F
 
 
 def _height(view: View, turned: bool) -> float:
-    """Height of a map over its width."""
+    """Return the ratio of height to width of a map."""
     x, y = view.size
     return x / y if turned else y / x
 
@@ -150,7 +150,7 @@ def _height(view: View, turned: bool) -> float:
 def draw_map(
     axis: Axes, field: Array, grid: Grid, top: float, view: View, turned: bool = False
 ) -> Any:
-    """One field to scale unless very flat, x to the right or, ``turned``, y; returns the image."""
+    """Draw one field, to scale unless very flat; return the image. ``turned``: y to the right."""
     half = 0.5 * grid.size[0], 0.5 * grid.size[1]
     values = np.ma.masked_less_equal(field, 0.0)
     right, up = (1, 0) if turned else (0, 1)
@@ -173,7 +173,7 @@ def draw_map(
 
 
 def name_sides(axes: Any, turned: bool) -> None:
-    """What is along the sides of maps, on the outer ones."""
+    """Label the sides of the outer maps."""
     right, up = ("y", "x") if turned else ("x", "y")
     for axis in axes[-1]:
         axis.set_xlabel(f"{right} [mm]")
@@ -182,7 +182,7 @@ def name_sides(axes: Any, turned: bool) -> None:
 
 
 def map_top(fields: Sequence[Array]) -> float:
-    """Top of the colour scale, in the unit of the fields."""
+    """Return the top of the colour scale, in the unit of the fields."""
     closed = np.concatenate([field[field > 0.0] for field in fields])
     return float(np.percentile(closed, MAP_PERCENTILE)) if closed.size else 1.0
 
@@ -191,17 +191,17 @@ def map_top(fields: Sequence[Array]) -> float:
 
 
 def middle(field: Array, direction: int) -> Array:
-    """Values along x (0) or y (1) next to the other axis' middle."""
+    """Return the values along x (0) or y (1) next to the middle of the other axis."""
     return np.take(field, field.shape[1 - direction] // 2, axis=1 - direction)
 
 
 def near_middle(coordinates: Array, direction: int) -> Any:
-    """Which nodes ``(n, 2)`` are on the row along x (0) or y (1) nearest to the middle."""
+    """Return which nodes ``(n, 2)`` are on the row along x (0) or y (1) nearest to the middle."""
     across = coordinates[:, 1 - direction]
     distance = np.abs(across)
     return distance <= distance.min() + ROW_SHARE * np.ptp(across)
 
 
 def centres(grid: Grid, direction: int) -> Array:
-    """Cell centres along x (0) or y (1)."""
+    """Return the cell centres along x (0) or y (1)."""
     return (grid.x, grid.y)[direction].ravel()

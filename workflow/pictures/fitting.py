@@ -1,4 +1,4 @@
-"""Layout of figures in which no text is cut: long ones are broken into lines, legends into rows."""
+"""Figure layout without cut texts: long texts are broken into lines, legends into rows."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 
-# Of the room that there is, what a line may fill: letters are not all of one width.
+# Share of the available width that a line may fill, since letters differ in width.
 FILLED = 0.97
-# Letters that a line has at least, however narrow its panel.
+# Smallest number of letters in a line, however narrow its panel.
 FEWEST_LETTERS = 8
-# Maps become smaller by what the lines of their titles take, and those narrower with them.
+# Largest number of passes: titles of more lines make maps smaller, and hence titles narrower.
 MOST_LAYOUTS = 4
 
 
 class FittedLayout(ConstrainedLayoutEngine):
     """Constrained layout that breaks titles and labels longer than their panels into lines.
 
-    How wide panels are is found first, by layouts without and then with broken lines.
+    The widths of panels are found first, by layouts without and then with broken lines.
     """
 
     def __init__(self, **parameters: Any) -> None:
@@ -30,19 +30,19 @@ class FittedLayout(ConstrainedLayoutEngine):
         self._words: dict[Text, str] = {}
 
     def execute(self, fig: Any) -> None:
-        """Give everything its place; once more where lines had to be broken."""
+        """Lay out the figure, and repeat this if lines had to be broken."""
         for _ in range(MOST_LAYOUTS):
             super().execute(fig)
             if not self._fit(fig):
                 break
 
     def _fit(self, figure: Figure) -> bool:
-        """Break what is too long for its place; whether there was any."""
+        """Break texts that are too long for their place; return whether there were any."""
         found = [self._break(text, room) for text, room in _texts(figure)]
         return any([*found, *(_narrow(legend, room) for legend, room in _legends(figure))])
 
     def _break(self, text: Text, room: float) -> bool:
-        """Break a text into lines no longer than the ``room`` [pixels]; whether it was."""
+        """Break a text into lines no longer than ``room`` [pixels]; return whether it was."""
         if not text.get_text() or not text.get_visible():
             return False
         box = text.get_window_extent()
@@ -57,7 +57,7 @@ class FittedLayout(ConstrainedLayoutEngine):
 
 
 def _texts(figure: Figure) -> Iterator[tuple[Text, float]]:
-    """Titles and labels with the room for their lines [pixels]."""
+    """Yield titles and labels with the width available for their lines [pixels]."""
     for part in _parts(figure):
         for text in part.texts:
             yield text, part.bbox.width  # type: ignore[attr-defined]
@@ -69,23 +69,23 @@ def _texts(figure: Figure) -> Iterator[tuple[Text, float]]:
 
 
 def _parts(figure: FigureBase) -> Iterator[FigureBase]:
-    """A figure and all that it is divided into."""
+    """Yield a figure and all its subfigures."""
     yield figure
     for part in figure.subfigs:
         yield from _parts(part)
 
 
 def _legends(figure: Figure) -> Iterator[tuple[Legend, float]]:
-    """Legends of whole figures, with the room for their rows [pixels]."""
+    """Yield the legends of whole figures with the width available for them [pixels]."""
     for part in _parts(figure):
         for legend in part.legends:
             yield legend, part.bbox.width  # type: ignore[attr-defined]
 
 
 def broken(words: str, letters: int) -> str:
-    """A text in lines of so many letters at most, broken after spaces, and names after ``_``.
+    """Break a text into lines of at most ``letters`` letters, after spaces, or names after ``_``.
 
-    What is still too long is broken anywhere.
+    A part that is still too long is broken anywhere.
     """
     lines = []
     for paragraph in words.split("\n"):
@@ -103,7 +103,7 @@ def broken(words: str, letters: int) -> str:
 
 
 def _narrow(legend: Legend, room: float) -> bool:
-    """Give a legend fewer columns until it fits the ``room`` [pixels]; whether it was too wide."""
+    """Reduce the columns of a legend to fit ``room`` [pixels]; return whether it was too wide."""
     before = legend._ncols  # type: ignore[attr-defined]
     while legend._ncols > 1 and legend.get_window_extent().width > room:  # type: ignore[attr-defined]
         legend.set_ncols(legend._ncols - 1)  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""What was measured in the figures of a run: points with one standard deviation."""
+"""Measured points, with one standard deviation, in the figures of a run."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from workflow.shell.analysis import Pictures
 from workflow.shell.measured import Beside, beside
 from workflow.shell.quantities import CurvesOf
 
-# Name of the figure of all that was measured.
+# Name of the figure with all measured points.
 MEASURED = "measured"
-WIDE, HIGH = 12.0, 4.2  # inches, of a row
-# The unit in the label of an axis.
+WIDE, HIGH = 12.0, 4.2  # of a row [inches]
+# Pattern of the unit in the label of an axis.
 IN_BRACKETS = re.compile(r".*\[(.*?)\]", re.DOTALL)
-# Lines of a figure are those of a curve when they agree to so much of what these reach: drawn
-# numbers have been divided by a unit and are otherwise the same.
+# A line of a figure is taken for a curve if they agree to this share of its extent: drawn numbers
+# have been divided by a unit and are otherwise the same.
 SAME = 1e-9
 
 
 def with_measured(
     plain: Pictures, measured: Sequence[Measured], curves: Sequence[CurvesOf]
 ) -> Pictures:
-    """The pictures of a run with points in all that show the curve they are of, and one of all."""
+    """Return pictures with points in each figure of their curves, and a figure of all points."""
 
     def figures_of(contents: Any) -> Mapping[str, Callable[[h5py.File], Figure]]:
         drawn = plain.figures_of(contents)
@@ -49,7 +49,7 @@ def with_measured(
 def _found(
     measured: Sequence[Measured], curves: Sequence[CurvesOf], file: h5py.File
 ) -> Iterator[Beside]:
-    """Those that can be compared; why others cannot is a warning of the run."""
+    """Yield the entries that can be compared; a warning of the run explains why others cannot."""
     for entry in measured:
         try:
             yield beside(entry, file, curves)
@@ -63,9 +63,10 @@ def _pointed(
     curves: Sequence[CurvesOf],
     file: h5py.File,
 ) -> Figure:
-    """A figure with points in each panel that has the line of a curve.
+    """Return a figure with points in each panel that has the line of their curve.
 
-    Those outside the computed range would press the rest together: they are in the figure of all.
+    Points outside the computed range are left out, as they would compress the rest; the figure of
+    all points shows them.
     """
     figure = draw(file)
     for found in _found(measured, curves, file):
@@ -81,7 +82,7 @@ def _pointed(
 
 
 def _name_points(axis: Axes) -> None:
-    """Name the points, the last that were drawn, beside what the legend has already."""
+    """Add an entry for the points, the last artists drawn, to the legend of a panel."""
     legend, points = axis.get_legend(), axis.containers[-1]
     handles: list[Any] = [] if legend is None else [*legend.legend_handles]
     names = [] if legend is None else [text.get_text() for text in legend.get_texts()]
@@ -89,7 +90,7 @@ def _name_points(axis: Axes) -> None:
 
 
 def _unit(label: str, base: str) -> float:
-    """How large the unit of an axis is; NaN where it is of another kind."""
+    """Return the size of the unit of an axis in the base unit; NaN if they are incompatible."""
     match = IN_BRACKETS.match(label)
     try:
         return to_base(f"1 {match[1]}", base) if match else 1.0 if base == "1" else np.nan
@@ -98,7 +99,7 @@ def _unit(label: str, base: str) -> float:
 
 
 def _is_of(line: Line2D, found: Beside, x_unit: float, y_unit: float) -> bool:
-    """Whether a line is the curve, in these units."""
+    """Return whether a line shows the curve, in these units."""
     drawn = (np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float))
     return _same(drawn[0] * x_unit, found.curve.x) and _same(drawn[1] * y_unit, found.curve.y)
 
@@ -138,7 +139,7 @@ def _draw_points(
 
 
 def _draw_all(measured: Sequence[Measured], curves: Sequence[CurvesOf], file: h5py.File) -> Figure:
-    """Each curve with its points, and beside it how far they are off."""
+    """Draw each curve with its points, next to their deviations."""
     rows = list(_found(measured, curves, file))
     figure = Figure(figsize=(WIDE, HIGH * max(len(rows), 1)), layout="constrained")
     panels = figure.subplots(max(len(rows), 1), 2, squeeze=False)

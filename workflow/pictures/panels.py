@@ -1,4 +1,4 @@
-"""What figures are made with: an empty one, panels, colours in an order, legends, ticks, words."""
+"""Building blocks of figures: empty figures, panels, colours, legends, ticks and texts."""
 
 from __future__ import annotations
 
@@ -19,36 +19,36 @@ from workflow.pictures.fitting import FittedLayout
 from workflow.pictures.style import COLOUR_MAP, LAST_SHADE
 
 Figures = Mapping[str, Callable[[h5py.File], Figure]]
-"""What draws each figure of results, by the figure's name."""
+"""Functions that draw the figures of results, by the figures' names."""
 
 WIDTH_INCHES = 12.0
-# At the sides of everything [inches].
+# Padding at the sides of a figure [inches].
 PAD = 0.06
-# Panels beside each other: of more interfaces further ones begin new rows.
+# Largest number of panels in a row; those of further interfaces begin new rows.
 MOST_COLUMNS = 3
-# Of a decade: further numbers would touch each other.
+# Labelled multiples within a decade; further numbers would touch each other.
 TICKS = (2.0, 5.0)
-# Ratios of the ends of an axis from which on only decades have numbers, and up to which they are
-# those of a linear one, so many.
+# Ratio of the ends of a logarithmic axis from which on only decades have numbers; ratio up to which
+# its numbers are those of a linear axis, and their count.
 MANY_DECADES, FEW_DECADES, FEW_TICKS = 100.0, 4.0, 5
-# A change is told in percent of what is at least this share of what became of it.
+# A change is given in percent if the first value is at least this share of the last.
 NEARLY_ZERO = 1e-2
-# Forces are shown in kN from here on [N], volumes in µm³ up to here [mm³].
+# Forces are shown in kN from this value on [N], volumes in µm³ up to this value [mm³].
 LARGE_FORCE, SMALL_VOLUME = 1e3, 1e-3
 
 
 def new_figure(title: str, height: float, compress: bool = False) -> Figure:
-    """An empty figure with a title, ``height`` in inches; panels to scale are compressed."""
+    """Return an empty figure of this ``height`` [inches]; ``compress`` is for panels to scale."""
     figure = Figure(
         figsize=(WIDTH_INCHES, height), layout=FittedLayout(w_pad=PAD, compress=compress)
     )
-    FigureCanvasAgg(figure)  # measures texts at once; others draw the figure for each
+    FigureCanvasAgg(figure)  # measures a text without drawing the figure, unlike others
     figure.suptitle(title, fontweight="bold")
     return figure
 
 
 def blocks(columns: int) -> int:
-    """How many rows so many columns are broken into."""
+    """Return the number of rows that ``columns`` columns are broken into."""
     return -(-columns // MOST_COLUMNS)
 
 
@@ -58,10 +58,10 @@ def panel_rows(
     columns: int,
     sharex: Literal["all", "row"] = "all",
 ) -> Any:
-    """So many ``rows`` of panels for every column; their axes ``(rows, columns)``.
+    """Return the axes ``(rows, columns)`` of ``rows`` panels for every column.
 
-    Of more than ``MOST_COLUMNS`` the others are below, in further :func:`blocks`. All of a row
-    share y, and x with all or with these. The figure, or part of one, is to be high enough.
+    Columns beyond ``MOST_COLUMNS`` are placed below, in further :func:`blocks`. All panels of a row
+    share y, and share x with all panels or with the row. The figure must be high enough.
     """
     across = min(columns, MOST_COLUMNS)
     places = figure.add_gridspec(rows * blocks(columns), across)
@@ -78,27 +78,27 @@ def panel_rows(
 
 
 def label_rows(axes: Any, labels: Iterable[str]) -> None:
-    """What is shown along y, on the panels at the left."""
+    """Label the y axes of the panels at the left."""
     for row, label in zip(axes, labels, strict=True):
         for axis in row[::MOST_COLUMNS]:
             axis.set_ylabel(label)
 
 
 def spread(items: Sequence[Any], most: int) -> list[Any]:
-    """At most so many of the items, evenly spread, first and last among them."""
+    """Return at most ``most`` of the items, evenly spread, including the first and the last."""
     places = np.linspace(0, len(items) - 1, min(most, len(items)))
     return [items[round(place)] for place in places]
 
 
 def shaded(items: Sequence[Any], most: int) -> list[tuple[Any, Any]]:
-    """At most so many of the items, each with its colour: more curves than that overlap."""
+    """Return at most ``most`` of the items, each with its colour; more curves would overlap."""
     chosen = spread(items, most)
     shades = colormaps[COLOUR_MAP](np.linspace(0.0, LAST_SHADE, len(chosen)))
     return list(zip(chosen, shades, strict=True))
 
 
 def changes(values: Mapping[str, Iterable[float]], digits: str, unit: str = "") -> str:
-    """What became of a value, by name, for a title; of many names where it is largest."""
+    """Describe the change of each named value for a title; of many names, the largest change."""
     if len(values) > MOST_COLUMNS:
         values = {name: tuple(series) for name, series in values.items()}
         name = max(values, key=lambda name: max(values[name]))
@@ -108,24 +108,24 @@ def changes(values: Mapping[str, Iterable[float]], digits: str, unit: str = "") 
 
 
 def change(before: float, after: float, unit: str) -> str:
-    """A relative change for a title; both values where the first is nearly nothing."""
+    """Describe a relative change for a title, or give both values if the first is nearly zero."""
     if before > NEARLY_ZERO * abs(after):
         return f"{after / before - 1.0:+.1%}"
     return f"{before:.3g} → {after:.3g} {unit}"
 
 
 def force_unit(largest: float) -> tuple[float, str]:
-    """Scale and unit in which forces up to so many N are shown."""
+    """Return the scale and the unit in which forces up to ``largest`` [N] are shown."""
     return (1e-3, "kN") if largest >= LARGE_FORCE else (1.0, "N")
 
 
 def volume_unit(largest: float) -> tuple[float, str]:
-    """Scale and unit in which volumes up to so many mm³ are shown."""
+    """Return the scale and the unit in which volumes up to ``largest`` [mm³] are shown."""
     return (1.0, "mm³") if largest >= SMALL_VOLUME else (1e9, "µm³")
 
 
 def legend_beside(axis: Axes, title: str | None = None) -> None:
-    """A legend to the right of the panel."""
+    """Draw a legend to the right of the panel."""
     axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=title)
 
 
@@ -136,7 +136,7 @@ def legend_below(
     fontsize: float | None = None,
     title: str | None = None,
 ) -> None:
-    """One legend of several panels, each name once, below all of them; by default in a row."""
+    """Draw one legend of several panels below all of them, each name once; by default in a row."""
     named: dict[str, Any] = {}
     for axis in axes:
         handles, names = axis.get_legend_handles_labels()
@@ -153,9 +153,9 @@ def legend_below(
 
 
 def widen(axis: Axes, least: float) -> None:
-    """Let the y axis of a panel span ``least`` at least: smaller changes are not worth seeing.
+    """Make the y axis of a panel span at least ``least``, since smaller changes do not matter.
 
-    On a logarithmic axis that is the share by which its ends differ.
+    On a logarithmic axis, ``least`` is the relative difference of its ends.
     """
     low, high = axis.get_ylim()
     if axis.get_yscale() == "log":
@@ -167,7 +167,7 @@ def widen(axis: Axes, least: float) -> None:
 
 
 def plain_ticks(line: Axis) -> None:
-    """A few plain numbers along a logarithmic axis, whatever it spans; limits come first."""
+    """Set a few plain numbers along a logarithmic axis of any range, after its limits are set."""
     low, high = line.get_view_interval()
     if high > low * MANY_DECADES:
         line.set_major_locator(LogLocator())
@@ -182,12 +182,12 @@ def plain_ticks(line: Axis) -> None:
 
 
 def whole_ticks(line: Axis) -> None:
-    """Whole numbers along an axis that counts."""
+    """Set whole numbers along an axis that counts."""
     line.set_major_locator(MaxNLocator(integer=True))
 
 
 def panel_grid(figure: Any, count: int, columns: int = 2) -> list[Axes]:
-    """So many panels in rows; those of the last one share all of its width."""
+    """Return ``count`` panels in rows; those of the last row share its whole width."""
     full, rest = divmod(count, columns)
     rows = full + bool(rest)
     places = figure.add_gridspec(rows, columns * max(rest, 1))

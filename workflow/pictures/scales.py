@@ -1,4 +1,4 @@
-"""From the units of results to those that are shown."""
+"""Factors from the units of results to those of figures."""
 
-# mm to µm, N/mm to N/µm, N mm to J.
+# Factors from mm to µm, from N/mm to N/µm, and from N mm to J.
 TO_MICRONS, PER_MICRON, TO_JOULES = 1e3, 1e-3, 1e-3

@@ -1,4 +1,4 @@
-"""The look of all figures: type and colours; and how they are written."""
+"""Style of all figures (type and colours), and functions that write them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from workflow.case.typeset import minus, typeset
 from workflow.shell.store import replacing
 
 DOTS_PER_INCH = 100
-# Of what is drawn as dots in vector graphics too: artists of more vertices.
+# Artists with more vertices are rasterised in vector graphics, at this resolution.
 DENSE, DENSE_DOTS_PER_INCH = 1000, 120
 FONT_SIZE = 13
 STYLE: dict[Any, Any] = {
@@ -29,7 +29,7 @@ STYLE: dict[Any, Any] = {
     "axes.titlesize": 13,
     "axes.titlelocation": "left",
     "axes.grid": True,
-    # All of a number is at its tick, but for very small and very large ones.
+    # Numbers at ticks have no common factor or offset, except very small and very large ones.
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-5, 7),
     "grid.alpha": 0.3,
@@ -37,20 +37,20 @@ STYLE: dict[Any, Any] = {
     "legend.framealpha": 0.85,
     "figure.titlesize": 15,
     "lines.linewidth": 1.8,
-    # Vector graphics look alike everywhere, and are the same bytes for the same results.
+    # Vector graphics look the same everywhere and are byte-identical for identical results.
     "svg.fonttype": "path",
     "svg.hashsalt": "fretscale",
 }
 # Okabe and Ito's colours, which colour-blind readers distinguish too.
 BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
 SKY, AMBER = "#56B4E9", "#E69F00"
-# Of fields, and of curves in an order; its end is too bright for lines.
+# Colours of fields and of ordered curves; the end of the map is too bright for lines.
 COLOUR_MAP, LAST_SHADE = "viridis", 0.9
-# Of panels that begin at 0, over the largest value.
+# Top of panels that begin at 0, relative to the largest value.
 HEADROOM = 1.1
 
 
-# Entries of files that would tell when they were written.
+# Metadata that would contain the time of writing.
 UNDATED: dict[str, dict[str, Any]] = {
     "png": {},
     "svg": {"Date": None},
@@ -64,10 +64,10 @@ def write_figures(
     formats: Sequence[str] = ("png",),
     vectors: dict[str, str] | None = None,
 ) -> list[Path]:
-    """Draw figures, given by their names, as files of these formats; returns their paths.
+    """Draw figures, given by their names, as files of these formats; return their paths.
 
-    Each appears under its name only when it is complete. ``vectors`` takes each as SVG text, by its
-    name, if it is given.
+    Each file appears under its name only when it is complete. If ``vectors`` is given, each figure
+    is added to it as SVG text by its name.
     """
     if formats:
         folder.mkdir(parents=True, exist_ok=True)
@@ -98,9 +98,10 @@ def _as_svg(figure: Figure) -> str:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Give everything its place for good: to save a figure with a layout would draw it twice.
+    """Fix the layout of a figure, because saving it with a layout engine would draw it twice.
 
-    What is dense is drawn as dots in vector graphics too, which would be large and slow to show.
+    Dense artists are rasterised in vector graphics, which would otherwise be large and slow to
+    show.
     """
     for text in _words(figure):
         text.set_text(typeset(text.get_text()))
@@ -117,9 +118,9 @@ def _lay_out(figure: Figure) -> None:
 
 
 def _artists(part: FigureBase | Axes) -> Iterator[Artist]:
-    """What a figure and its panels draw: not what ticks and legends are made of, which is little.
+    """Yield the artists of a figure and its panels, except the small parts of ticks and legends.
 
-    ``findobj`` looks through those too, and takes as long as a tenth of the drawing.
+    ``findobj`` would search these too, which takes up to a tenth of the drawing time.
     """
     for artist in part.get_children():
         yield artist
@@ -128,7 +129,7 @@ def _artists(part: FigureBase | Axes) -> Iterator[Artist]:
 
 
 def _words(figure: Figure) -> Iterator[Text]:
-    """Titles and labels: what was made of numbers, with hyphens for minus."""
+    """Yield titles and labels, in which numbers have a hyphen for the minus sign."""
     for part in (figure, *figure.subfigs):
         yield from part.texts
     for axis in figure.axes:
@@ -137,14 +138,14 @@ def _words(figure: Figure) -> Iterator[Text]:
 
 
 def _names_in_legends(figure: Figure) -> Iterator[Text]:
-    """What legends call curves: numbers in them may be names, and stay."""
+    """Yield the texts of legends, in which numbers may be names and remain unchanged."""
     for artist in _artists(figure):
         if isinstance(artist, Legend):
             yield from artist.get_texts()
 
 
 def _vertices(artist: Any) -> int:
-    """About how many points a line or collection draws."""
+    """Return approximately how many points a line or collection draws."""
     if isinstance(artist, Line2D):
         return int(np.size(artist.get_xdata(orig=False)))
     if isinstance(artist, QuadMesh):

@@ -1,4 +1,4 @@
-"""Scripts that show a run in ParaView: what they show, and where to find the first of them."""
+"""Scripts that show a run in ParaView, and the file to open first."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ PLACEHOLDER = "SCENE: dict[str, Any] = {}\n"
 
 @dataclass(frozen=True)
 class Shown:
-    """A series in a view: its ``file`` and the arrays, with their units, of colours and motion.
+    """Series in a view: its ``file``, and the arrays, with units, for colours and motion.
 
-    A ``factor`` of 0 lets the motion be seen well.
+    With a ``factor`` of 0 the motion is scaled to be well visible.
     """
 
     file: str
@@ -29,7 +29,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class View:
-    """A view of the window; all that is ``shown`` has the times of the first."""
+    """View of the window; everything in ``shown`` has the times of the first series."""
 
     title: str
     shown: Sequence[Shown]
@@ -37,7 +37,7 @@ class View:
 
 @dataclass(frozen=True)
 class Scene:
-    """One to four ``views``; ``time`` says what their times are, and ``begin`` the first shown."""
+    """One to four ``views``; ``time`` names their times, and ``begin`` is the first one shown."""
 
     title: str
     time: str
@@ -46,7 +46,7 @@ class Scene:
 
 
 def write_view(scene: Scene, path: Path) -> Path:
-    """Write the script that shows a scene; returns its path."""
+    """Write the script that shows a scene; return its path."""
     script = resources.files("workflow.pictures").joinpath("view_script.py")
     text = script.read_text(encoding="utf-8")
     what = pformat(asdict(scene), width=98, sort_dicts=False)
@@ -56,6 +56,6 @@ def write_view(scene: Scene, path: Path) -> Path:
 
 
 def first_file(run: Path) -> Path | None:
-    """The file in the folder of a run that is to be opened first in ParaView, if there is one."""
+    """Return the file of a run that should be opened first in ParaView, if there is one."""
     path = run / "paraview" / FIRST
     return path if path.exists() else None

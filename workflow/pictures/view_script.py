@@ -17,13 +17,13 @@ from paraview import simple
 
 SCENE: dict[str, Any] = {}
 
-# Pixels of a picture, the share of what is shown that an exaggerated motion may take, and the room
-# that is left for what stands beside it.
+# Pixels of a picture; size of an exaggerated motion relative to the model; and margin around the
+# model for texts and colour bars.
 SIZE, SHARE, ROOM = (1800, 1100), 0.1, 1.15
-# Times that ranges of colours are taken from, at most; lines are so many pixels wide.
+# Largest number of times that colour ranges are taken from; width of lines in pixels.
 TIMES, LINE = 12, 6
-# How to cut the window for so many views: place by place, beside or below each other. The halves of
-# place n are 2n + 1 and 2n + 2.
+# Places to split, by the number of views: "|" puts the halves next to each other, "-" below each
+# other. The halves of place n are 2n + 1 and 2n + 2.
 CUTS: dict[int, list[tuple[int, str]]] = {
     1: [],
     2: [(0, "|")],
@@ -33,7 +33,7 @@ CUTS: dict[int, list[tuple[int, str]]] = {
 
 
 def folder() -> Path:
-    """The folder of this file: ParaView's window does not tell a script where it is."""
+    """Return the folder of this file, which ParaView's window does not pass to a script."""
     here = [Path(str(globals()["__file__"])).parent] if globals().get("__file__") else []
     command = Path("/proc/self/cmdline")
     if command.exists():
@@ -48,7 +48,7 @@ def folder() -> Path:
 
 
 class Series:
-    """A file that is shown, with how large its arrays become over its times."""
+    """File that is shown, with the ranges of its arrays over its times."""
 
     def __init__(self, path: Path) -> None:
         self.reader = simple.PVDReader(registrationName=path.name, FileName=str(path))
@@ -57,13 +57,13 @@ class Series:
         self._looked_at = sorted({*self.times[::picked], self.times[-1]})
 
     def extent(self) -> list[float]:
-        """Lengths of the sides of what is shown."""
+        """Return the lengths of the sides of the model."""
         self.reader.UpdatePipeline(self.times[-1])
         bounds = self.reader.GetDataInformation().GetBounds()
         return [bounds[1] - bounds[0], bounds[3] - bounds[2], bounds[5] - bounds[4]]
 
     def span(self, name: str) -> tuple[float, float]:
-        """Least and largest value of an array, of vectors their length, over the times."""
+        """Return the smallest and largest value of an array, or vector length, over the times."""
         found = []
         for time in self._looked_at:
             self.reader.UpdatePipeline(time)
@@ -74,7 +74,7 @@ class Series:
 
 
 class View:
-    """One view of the window: sources, each with its colours and its motion."""
+    """View of the window: sources, each with its colours and its motion."""
 
     def __init__(self, view: Any, title: str) -> None:
         self.view, self._title = view, title
@@ -87,7 +87,7 @@ class View:
         source = series.reader
         if shown.get("warp"):
             largest = series.span(shown["warp"])[1]
-            # Lengths are not made shorter than they are.
+            # Displacements are never scaled down.
             least = 1.0 if shown["warp"].endswith("[mm]") else 0.0
             factor = shown.get("factor") or max(self._factor(largest), least)
             vectors = ["POINTS", shown["warp"]]
@@ -102,7 +102,7 @@ class View:
             self._colour(display, series, shown["colour"])
 
     def _factor(self, largest: float) -> float:
-        """1, 2 or 5 times a power of ten by which motion is well seen."""
+        """Return 1, 2 or 5 times a power of ten as a scale that makes the motion well visible."""
         wanted = SHARE * math.dist(self._extents, (0.0, 0.0, 0.0)) / largest if largest else 1.0
         power = 10.0 ** math.floor(math.log10(wanted))
         return max(step * power for step in (1, 2, 5) if step == 1 or step * power <= wanted)
@@ -113,14 +113,14 @@ class View:
         low, high = series.span(name)
         known = COLOURED.get(name, (low, high))
         low, high = COLOURED[name] = min(low, known[0]), max(high, known[1])
-        # Of what is the same everywhere, a scale that shows this.
+        # A uniform field needs a range of some width.
         colours.RescaleTransferFunction(low, high if high > low else low + (abs(low) or 1.0))
         display.SetScalarBarVisibility(self.view, True)
         bar = simple.GetScalarBar(colours, self.view)
         bar.Title, bar.ComponentTitle = name, ""
 
     def label(self, series: Series, time_is: str) -> None:
-        """Title and time."""
+        """Show the title and the time."""
         title = simple.Text(registrationName=self._title, Text=self._title)
         label = simple.Show(title, self.view)
         label.WindowLocation, label.FontSize = "Upper Center", 16
@@ -130,7 +130,7 @@ class View:
             simple.Show(time, self.view).WindowLocation = "Lower Left Corner"
 
     def aim(self) -> None:
-        """Look at what is shown from above and the side, or straight at a plane that stays one."""
+        """Look at the model from above and the side, or straight at a plane that stays plane."""
         flat = [extent < 1e-6 * max(self._extents) for extent in self._extents]
         away, up = [0.3, -0.7, 1.0], [0.0, 0.0, 1.0]
         if flat[1]:
@@ -140,7 +140,7 @@ class View:
         self.view.CameraFocalPoint, self.view.CameraPosition = [0.0, 0.0, 0.0], away
         self.view.CameraViewUp, self.view.CameraParallelProjection = up, 1
         simple.ResetCamera(self.view)
-        # Where the view is narrower than high, ParaView looks at its height alone.
+        # ParaView fits the model to the height, even if the view is narrower than high.
         width, height = self.view.ViewSize
         self.view.CameraParallelScale *= ROOM * max(1.0, height / max(width, 1))
 
@@ -150,7 +150,7 @@ COLOURED: dict[str, tuple[float, float]] = {}
 
 
 def cut_window(count: int) -> tuple[Any, list[Any]]:
-    """The window, or a page of it, cut for so many views, and these."""
+    """Return the window, or a page of it, split into ``count`` views, and the views."""
     empty = simple.GetActiveView() and not simple.GetSources()
     window = simple.GetLayout() if empty else simple.CreateLayout()
     places = {0}
@@ -169,7 +169,7 @@ def cut_window(count: int) -> tuple[Any, list[Any]]:
 
 
 def main() -> None:
-    """Build the views, go to the time to begin with, and write the picture that is asked for."""
+    """Build the views, go to the first time, and write the picture that was requested."""
     simple.LoadPalette("WhiteBackground")
     here = folder()
     opened: dict[str, Series] = {}

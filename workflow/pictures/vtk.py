@@ -1,4 +1,4 @@
-"""Files that ParaView reads: arrays with their units, faces as surfaces, series over time."""
+"""Files for ParaView: arrays with their units, faces as surfaces, series over time."""
 
 from __future__ import annotations
 
@@ -27,11 +27,12 @@ Step = tuple[float, str, Path, Any]
 
 # Names of the components of vectors, and of symmetric tensors in VTK's order.
 COMPONENTS = {3: ("X", "Y", "Z"), 6: ("XX", "YY", "ZZ", "XY", "YZ", "XZ")}
-# What the times of a series may be.
+# Possible meanings of the times of a series.
 CYCLES, INCREMENTS, SECONDS = "cycles [1]", "increment [1]", "time [s]"
-# Of zlib: files of single precision are as small as with its default, for a quarter less work.
+# Level of zlib; files of single precision are as small as with the default, for a quarter less
+# work.
 COMPRESSION = 1
-# The vectors that make a profile of the pressure on a line.
+# Vectors that show the pressure on a line as a profile.
 PROFILE = "normal_traction [MPa]"
 
 
@@ -39,8 +40,8 @@ PROFILE = "normal_traction [MPa]"
 class FacePoints:
     """Cells of a ``grid`` as points at their centres, in the nominal plane of a face.
 
-    They are those that ``on_face`` ``(nx, ny)`` marks, all without it. Triangles join them, in line
-    contacts lines.
+    Only the cells that ``on_face`` ``(nx, ny)`` marks are used, or all without it. Triangles join
+    the points; in line contacts, lines.
     """
 
     grid: Grid
@@ -48,21 +49,21 @@ class FacePoints:
     on_face: Mask | None = None
 
     def of(self, field: h5py.Dataset | Array) -> Array:
-        """A grid field ``(nx, ny)`` at the points ``(n,)``, x fastest."""
+        """Return a grid field ``(nx, ny)`` at the points ``(n,)``, with x varying fastest."""
         values: Array = field[()].T[self._shown.T]
         return values
 
     def normal(self, heights: Array) -> Array:
-        """Global vectors ``(n, 3)`` along the face's normal, so long at the points ``(n,)``."""
+        """Return global vectors ``(n, 3)`` of lengths ``heights`` ``(n,)`` along the normal."""
         return np.outer(heights, self.frame.axes[2])
 
     def tangential(self, field: h5py.Dataset | Array) -> tuple[Array, Array, Array]:
-        """Global vectors ``(n, 3)`` of a grid field ``(2, nx, ny)``, and its x and y ``(n,)``."""
+        """Return global vectors ``(n, 3)`` of a field ``(2, nx, ny)``, and its x and y ``(n,)``."""
         x, y = (self.of(component) for component in field[()])
         return self.frame.to_global(np.stack([x, y, np.zeros_like(x)], axis=1)), x, y
 
     def mesh(self, fields: Fields) -> pyvista.PolyData:
-        """The points with their fields, a line or a surface."""
+        """Return the points with their fields as a line or a surface."""
         import pyvista
 
         if self.grid.line:
@@ -74,14 +75,14 @@ class FacePoints:
 
     @property
     def _shares(self) -> Fields:
-        """What of the face each point stands for: sums of a field times this are its integrals."""
+        """Part of the face for each point: the sum of a field times it is the field's integral."""
         if self.grid.line:
             return {"length": (np.full(len(self.places), self.grid.pitch[0]), "mm")}
         return {"area": (np.full(len(self.places), self.grid.cell_area), "mm^2")}
 
     @cached_property
     def places(self) -> Array:
-        """The points in space ``(n, 3)`` [mm]."""
+        """Positions of the points in space ``(n, 3)`` [mm]."""
         local = np.stack([*map(self.of, self.grid.centres), self.of(np.zeros(self.grid.shape))])
         return self.frame.to_global(local.T) + self.frame.origin
 
@@ -89,12 +90,12 @@ class FacePoints:
     def triangles(self) -> np.ndarray:
         """Points of the triangles ``(m, 3)`` of a surface, counterclockwise seen from body 2.
 
-        Two in a square of four points, and one where three are on the face.
+        A square of four points has two triangles, a square of three points one.
         """
         a, b, c, d = _corners(self._numbers)
         ways = np.array([[a, b, c], [a, c, d], [a, b, d], [b, c, d]]).swapaxes(1, 2)
         there = np.all(ways >= 0, axis=2)
-        # The last two ways are of squares that have no others.
+        # The last two ways apply only to squares that have no other triangles.
         there = np.concatenate([there[:2], there[2:] & ~there[:2].any(axis=0)])
         triangles: np.ndarray = ways[there]
         return triangles
@@ -105,34 +106,35 @@ class FacePoints:
 
     @cached_property
     def _numbers(self) -> Indices:
-        """Numbers of the points at their cells ``(nx, ny)``; -1 where there is none."""
+        """Numbers of the points at their cells ``(nx, ny)``; -1 for cells without a point."""
         numbers = np.full(self.grid.shape, -1)
         numbers.T[self._shown.T] = np.arange(np.count_nonzero(self._shown))
         return numbers
 
     @property
     def _lines(self) -> Indices:
-        """Lines along x as VTK has them, each as long as it is not interrupted."""
+        """Uninterrupted lines along x in VTK's cell format."""
         cells = np.flatnonzero(self._shown)
         pieces = np.split(np.arange(len(cells)), np.flatnonzero(np.diff(cells) > 1) + 1)
         return np.concatenate([np.insert(piece, 0, len(piece)) for piece in pieces])
 
 
 def _corners(numbers: Indices) -> tuple[Indices, ...]:
-    """Four corners ``(m,)`` of each square between so numbered points, counterclockwise."""
+    """Return the four corners ``(m,)`` of each square between numbered points, counterclockwise."""
     corners = numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]
     return tuple(corner.ravel() for corner in corners)
 
 
 def quadrilaterals(numbers: Indices) -> Indices:
-    """Corners ``(m, 4)`` of the squares between points that are ``numbers`` ``(nx, ny)``."""
+    """Return the corners ``(m, 4)`` of the squares between points ``numbers`` ``(nx, ny)``."""
     return np.stack(_corners(numbers), axis=1)
 
 
 def traction_fields(contact: h5py.Group, points: FacePoints) -> Fields:
-    """Pressure, shear and slip on a grid: global vectors, and ``face_`` components in the frame.
+    """Return pressure, shear and slip on a grid: global vectors, and ``face_`` components.
 
-    Of a line the pressure is a vector too, ``normal_traction``: warped by it, it is a profile.
+    For a line contact the pressure is also a vector, ``normal_traction``, which shows it as a
+    profile when the line is warped by it.
     """
     pressure = points.of(contact["pressure"])
     fields: Fields = {"pressure": (pressure, "MPa")}
@@ -146,14 +148,14 @@ def traction_fields(contact: h5py.Group, points: FacePoints) -> Fields:
 
 
 def named(name: str, unit: str) -> str:
-    """The name of an array with its unit, ``1`` where it has none: ParaView shows nothing else."""
+    """Return the name of an array with its unit, ``1`` if none; ParaView shows only the name."""
     return f"{name} [{unit}]"
 
 
 def attach(data: pyvista.DataSetAttributes, fields: Fields) -> None:
-    """Add ``fields`` to point data in single precision, their units at the end of their names.
+    """Add ``fields`` to point data in single precision, with their units at the end of their names.
 
-    What has no finite value is left out.
+    A field without finite values is left out.
     """
     for name, (values, unit) in fields.items():
         if not np.isfinite(values).any():
@@ -177,10 +179,10 @@ def write_stl(surface: pyvista.PolyData, path: Path) -> None:
 
 
 def write_series(path: Path, time_is: str, steps: Iterable[Step]) -> list[Path]:
-    """Write the data sets of a series, and a ``.pvd`` over them; returns all files.
+    """Write the data sets of a series, and a ``.pvd`` file that lists them; return all files.
 
-    Those of one time are its parts. Times are written with all digits; ``time_is`` says with its
-    unit what they are, and is a field array of every data set.
+    Data sets at the same time are its parts. Times are written with all digits; ``time_is`` names
+    their meaning and unit, and becomes a field array of every data set.
     """
     parts: dict[float, int] = {}
     lines, written = [], []
@@ -218,13 +220,13 @@ def write_xml(data: Any, path: Path) -> None:
 
 
 def _run(writer: Any, path: Path) -> None:
-    """Let a VTK writer write ``path``; raises OSError where it cannot."""
+    """Let a VTK writer write ``path``. Raises OSError if it fails."""
     from vtkmodules.vtkCommonCore import vtkObject
 
-    # Said once, by us.
+    # VTK's warning is suppressed, because the exception reports the failure.
     vtkObject.GlobalWarningDisplayOff()
     with replacing(path) as partial:
         writer.SetFileName(str(partial))
         if not writer.Write():
-            # It does not tell why: mostly this.
+            # VTK does not report the reason; this is the most frequent one.
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

@@ -1,1 +1,1 @@
-"""A finished run, or several side by side, on a page for people."""
+"""HTML reports of a finished run, or of several side by side."""

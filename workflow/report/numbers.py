@@ -1,4 +1,4 @@
-"""Main results as tables: those of several groups side by side where they have the same names."""
+"""Tables of the main results; groups with the same quantities are shown side by side."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from workflow.report.page import Html, element, lines, note, table, unbroken
 from workflow.shell.quantities import Quantity
 from workflow.shell.summary import number_at, required_number
 
-# Groups side by side in a table at most, for it to be read on a sheet of paper.
+# Largest number of groups side by side, so that a table fits on a sheet of paper.
 COLUMNS = 4
-# What errors are marked by that are not all of one kind.
+# Marks that distinguish several kinds of error.
 LETTERS = "abcdefgh"
-# Share of their names that groups in one table have in common.
+# Smallest share of their names that groups in one table must have in common.
 ALIKE = 0.5
 
 Groups = dict[str, dict[str, Quantity]]
 
 
 def results(quantities: Sequence[Quantity], summary: Mapping[str, Any]) -> Html:
-    """Tables of all quantities, and what their errors are of."""
+    """Return tables of all quantities, and a note on their errors."""
     marks = _marks(quantities)
     parts = []
     for family in _families(quantities):
@@ -35,12 +35,12 @@ def results(quantities: Sequence[Quantity], summary: Mapping[str, Any]) -> Html:
 
 
 def _share(names: Sequence[str], part: int, parts: int) -> Sequence[str]:
-    """One of so many parts that are as long as each other, or longer by one."""
+    """Return one of ``parts`` consecutive parts of nearly equal length."""
     return names[part * len(names) // parts : (part + 1) * len(names) // parts]
 
 
 def _families(quantities: Iterable[Quantity]) -> list[Groups]:
-    """Quantities by group and name, groups with alike names together."""
+    """Return quantities by group and name, with similar groups together."""
     groups: Groups = {}
     for quantity in quantities:
         groups.setdefault(quantity.group, {})[quantity.name] = quantity
@@ -79,7 +79,7 @@ def _cell(
 
 
 def value_of(quantity: Quantity, value: float, mark: str = "") -> Html:
-    """A value with its unit and its estimated error, which may have a ``mark`` for a note."""
+    """Return a value with its unit and estimated error, which may have a ``mark`` for a note."""
     text = number(str(readable(value, quantity.unit, quantity.error, quantity.everyday)))
     shown = unbroken(text)
     if quantity.where:
@@ -92,13 +92,13 @@ def value_of(quantity: Quantity, value: float, mark: str = "") -> Html:
 
 
 def _marks(quantities: Sequence[Quantity]) -> dict[str, str]:
-    """A letter for each kind of error; none where there is one kind only."""
+    """Return a letter for each kind of error, or nothing if there is only one kind."""
     sources = list(dict.fromkeys(q.error_of for q in quantities if q.error is not None))
     return dict(zip(sources, LETTERS, strict=False)) if len(sources) > 1 else {}
 
 
 def _note(quantities: Sequence[Quantity], marks: Mapping[str, str]) -> Html:
-    """What the errors are of, and that others have none."""
+    """Return a note on what the errors cover and whether some results have none."""
     known = [quantity for quantity in quantities if quantity.error is not None]
     if not known:
         return note("No error is estimated of any of these results.")
@@ -113,7 +113,7 @@ def _note(quantities: Sequence[Quantity], marks: Mapping[str, str]) -> Html:
 
 
 def error_budget(quantities: Sequence[Quantity], summary: Mapping[str, Any]) -> Html:
-    """Parts of every error that has parts; empty where none has."""
+    """Return a table of the parts of each error; empty if no error has parts."""
     budgets = {q.budget: q for q in quantities if q.budget}
     parts = {path: _parts(summary, path) for _, path in budgets}
     columns = [

@@ -1,7 +1,7 @@
-"""Pages of HTML that need nothing else: their look, and the few things that they are made of.
+"""Self-contained HTML pages: their style and the elements that they consist of.
 
-No scripts, no links to elsewhere; figures are vector graphics within the page. What is put in as
-text is escaped, what is put in as HTML is a :class:`Html`.
+Pages have no scripts and no external links; figures are vector graphics within the page. Text is
+escaped unless it is an :class:`Html`.
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ STYLE = Path(__file__).with_name("page.css")
 
 
 class Html(str):
-    """Text that is HTML already."""
+    """Text that is already HTML."""
 
     __slots__ = ()
 
 
 def html(text: object) -> Html:
-    """A text as HTML; HTML as it is."""
+    """Return a text as HTML; HTML is returned unchanged."""
     return text if isinstance(text, Html) else Html(escape(str(text)))
 
 
 def element(tag: str, *inside: object, **attributes: str) -> Html:
-    """An element around texts and elements; a ``cls`` is its class."""
+    """Return an element around texts and elements; the argument ``cls`` sets its class."""
     named = {name.replace("cls", "class"): value for name, value in attributes.items()}
     given = "".join(f' {name}="{escape(value)}"' for name, value in named.items())
     return Html(f"<{tag}{given}>{''.join(map(html, inside))}</{tag}>")
 
 
 def lines(parts: Iterable[Html]) -> Html:
-    """Elements one below the other."""
+    """Return elements one below the other."""
     return Html("\n".join(parts))
 
 
 def section(title: str, *inside: object, key: str = "") -> Html:
-    """A section with its heading; empty for one without anything in it."""
+    """Return a section with its heading; empty if it has no content."""
     if not any(inside):
         return Html("")
     name = key or re.sub(r"\W+", "-", title.lower()).strip("-")
@@ -48,7 +48,7 @@ def section(title: str, *inside: object, key: str = "") -> Html:
 
 
 def contents_of(parts: Sequence[Html]) -> Html:
-    """Links to the sections."""
+    """Return links to the sections."""
     links = []
     for part in filter(None, parts):
         name = part.split('id="', 1)[1].split('"', 1)[0]
@@ -58,12 +58,12 @@ def contents_of(parts: Sequence[Html]) -> Html:
 
 
 def folded(title: str, *inside: object) -> Html:
-    """What only some want to see: open where the page is printed."""
+    """Return content that is collapsed on the screen and open in print."""
     return element("details", element("summary", title), *inside)
 
 
 def items(texts: Iterable[object]) -> Html:
-    """A list."""
+    """Return a list."""
     return element("ul", *(element("li", text) for text in texts))
 
 
@@ -73,10 +73,10 @@ def table(
     numbers: Sequence[int] = (),
     stacks: bool = False,
 ) -> Html:
-    """A table, the first cell of a row being its heading; columns of ``numbers`` keep right.
+    """Return a table; the first cell of each row is a heading; align columns ``numbers`` right.
 
-    Rows of one cell go over all columns. Wide tables scroll by themselves, or, where there is
-    little room, ``stacks`` the cells of each row below each other.
+    A row of one cell spans all columns. Wide tables scroll separately; with ``stacks``, the cells
+    of a row are placed below each other on narrow screens.
     """
     labels = [str(text) for text in head] if stacks else [""] * len(head)
     titles = element(
@@ -107,24 +107,24 @@ def _cell(tag: str, text: object, number: bool, **attributes: str) -> Html:
 
 
 def unbroken(text: str) -> Html:
-    """A text that stays in one line: a number with its unit, say."""
+    """Return a text that is not broken into lines, such as a number with its unit."""
     return element("span", text, cls="short")
 
 
 def code(path: str) -> Html:
-    """A name of a case or a summary, broken where its parts end if it must be."""
+    """Return a name of a case or a summary, which may be broken after its parts."""
     return element("code", Html(re.sub(r"([._])", r"\1<wbr>", escape(path))))
 
 
 def note(*inside: object) -> Html:
-    """What explains something, smaller."""
+    """Return an explanation in small type."""
     return element("p", *inside, cls="note")
 
 
 def picture(svg: str, what: str, captioned: bool = True) -> Html:
-    """A figure given as SVG; ``what`` it shows is its caption unless the figure says it itself.
+    """Return a figure given as SVG; ``what`` is its caption unless the figure has a title itself.
 
-    It is an image of its own: names within one would be taken for those within another.
+    It is embedded as a separate image, because names within one SVG would conflict with others.
     """
     source = base64.b64encode(_trimmed(svg).encode("utf-8")).decode("ascii")
     image = f'<img alt="{escape(what)}" src="data:image/svg+xml;base64,{source}">'
@@ -132,12 +132,12 @@ def picture(svg: str, what: str, captioned: bool = True) -> Html:
 
 
 def _trimmed(svg: str) -> str:
-    """Without what only other programs read."""
+    """Return an SVG text without its metadata, which only other programs read."""
     return re.sub(r"\s*<metadata>.*?</metadata>", "", svg, count=1, flags=re.DOTALL)
 
 
 def page(title: str, *inside: object) -> str:
-    """A whole page."""
+    """Return a complete page."""
     style = STYLE.read_text("utf-8")
     head = lines(
         [

@@ -1,4 +1,4 @@
-"""The page of a finished run, for somebody who was not there."""
+"""Report of a finished run for readers who did not start it."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ from workflow.shell.expectations import Verdict, verdicts
 from workflow.shell.quantities import Quantity
 from workflow.shell.summary import QuantityError, counted_from_first
 
-# Sections of a case that are no part of what is computed, and those that most readers look for.
+# Sections of a case that do not affect the results, and those that most readers look for.
 APART = "title", "analysis", "output", "assumed", "measured", "expect", "reported"
 LOOKED_FOR = (
     *("materials", "friction", "load_path", "wear", "joint", "evolution", "drive", "excitation"),
     *("energies", "ageing", "forces", "frequencies"),
 )
-# Results that are signs begin with these.
+# Beginnings of the paths of results that are signs (1, 0 or -1).
 SIGNS = "change.", "trend."
-# Letters of a value that stays in one line.
+# Length below which a value is not broken into lines.
 SHORT = 20
-# Stages of less are not told [s].
+# Shorter stages are not listed [s].
 AT_ONCE = 0.05
-# Letters of a digest that tell files apart.
+# Number of letters of a digest that are shown.
 DIGEST = 12
 
 
 def run_page(run: ToldRun) -> str:
-    """The whole page."""
+    """Return the complete report."""
     quantities = analysis_of(run.case).quantities(run.case, run.summary)
     budget = error_budget(quantities, run.summary)
     parts = [
@@ -102,7 +102,7 @@ def _outline(run: ToldRun) -> Html:
 
 
 def _warnings(warnings: Sequence[str]) -> Html:
-    """Each in its own words; those that several places share once."""
+    """Return a list of warnings; one that applies to several places appears once."""
     places: dict[str, list[str]] = {}
     parts = [warning.partition(": ") for warning in warnings]
     alike = Counter(rest for _, _, rest in parts)
@@ -118,7 +118,7 @@ def _warnings(warnings: Sequence[str]) -> Html:
 
 
 def _verdicts(run: ToldRun) -> list[Verdict | str]:
-    """Of every expectation; the reason where there is no number to compare."""
+    """Return the verdict on each expectation, or the reason why there is no number to compare."""
     found: list[Verdict | str] = []
     for entry in run.case.expect:
         one = run.case.model_copy(update={"expect": (entry,)})
@@ -162,13 +162,13 @@ def _verdict_cells(verdict: Verdict | str, quantity: Quantity | None) -> list[ob
     tolerance = verdict.entry.tolerance
     if verdict.expected:
         errors = percent(verdict.error), exact_percent(tolerance)
-    else:  # of a value 0 in its unit
+    else:  # the error of an expected value 0 is absolute
         errors = f"{verdict.error:.2g}", f"{tolerance:.2g}"
     return [*(unbroken(number(text)) for text in (expected, computed, *errors)), met]
 
 
 def _as_expected(value: float, unit: str, quantity: Quantity | None) -> str:
-    """In the unit of the expectation; bare numbers in that which suits the quantity, if any."""
+    """Return a value in the unit of the expectation, or, for a bare number, of the quantity."""
     if unit or quantity is None:
         return f"{readable(value, '1', GIVEN).number} {pretty(unit)}".strip()
     return str(readable(value, quantity.unit, GIVEN, quantity.everyday))
@@ -217,13 +217,13 @@ def _figures(run: ToldRun) -> Iterator[Html]:
 
 
 def _remarks(summary: Mapping[str, Any]) -> Html:
-    """What an analysis explains in sentences."""
+    """Return the explanations that the analysis gives in sentences."""
     told = [typeset(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("explanation") or ()]
     return items(told) if told else Html("")
 
 
 def _case(run: ToldRun) -> Iterator[Html]:
-    """Entries of the case that are not as they are if nothing is said, in two parts."""
+    """Yield the entries of the case that differ from their defaults, in two parts."""
     leaves = [leaf for leaf in leaves_of(run.case) if leaf.told and _top(leaf) not in APART]
     first = [leaf for leaf in leaves if _top(leaf) in LOOKED_FOR]
     assumed = run.case.assumed
@@ -263,7 +263,7 @@ def _entries(leaves: Sequence[Leaf], assumed: Sequence[str]) -> Html:
 
 
 def _kept_together(text: str) -> object:
-    """A short text in one line."""
+    """Return a text, marked to stay in one line if it is short."""
     return element("span", text, cls="short") if len(text) < SHORT else text
 
 

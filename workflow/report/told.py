@@ -1,4 +1,4 @@
-"""What a finished run is told of, and where a page of it takes that from."""
+"""Data of a finished run that its report is made from."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from workflow.case.sections import Case
 
 @dataclass(frozen=True)
 class ToldRun:
-    """A run that has come to its end.
+    """Finished run with the data for its report.
 
-    ``case_text`` is the case as run, ``kind`` the name of its kind. ``input_files`` are digests of
-    the files that it names, ``figures`` SVG texts by their names.
+    ``case_text`` is the case as run and ``kind`` the name of its kind. ``input_files`` are digests
+    of the files that it names, ``figures`` SVG texts by their names.
     """
 
     case: Case

@@ -1,4 +1,4 @@
-"""Writing the page of a run: as it ends, and anew from its folder."""
+"""Writing of the report of a run, at its end or later from its folder."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from workflow.shell.store import file_digest, read_bytes, write_text
 
 
 def pictures_of(analysis: Analysis[Any], case: Case) -> Callable[[], Pictures] | None:
-    """What draws the results of a case, with what was measured in it; None for nothing."""
+    """Return the functions that draw a case, including measured points; None if there are none."""
     if analysis.pictures is None or not case.measured:
         return analysis.pictures
     return partial(_with_measured, analysis.pictures, case.measured, analysis.curves)
@@ -31,21 +31,21 @@ def pictures_of(analysis: Analysis[Any], case: Case) -> Callable[[], Pictures] |
 def _with_measured(
     pictures: Callable[[], Pictures], measured: Sequence[Measured], curves: Sequence[CurvesOf]
 ) -> Pictures:
-    from workflow.pictures.measured import with_measured  # plots take a second to load
+    from workflow.pictures.measured import with_measured  # it takes a second to load
 
     return with_measured(pictures(), measured, curves)
 
 
 def write_page(run: ToldRun, path: Path) -> None:
-    """Write the page of a run, which appears once it is whole."""
+    """Write the report of a run, which appears under its name once it is complete."""
     write_text(path, run_page(run))
 
 
 def write_report(root: Path, out: Path | None = None) -> Path:
-    """Write the page of the finished run in a folder anew, into the folder or a file ``out``.
+    """Write the report of the finished run in a folder again, into the folder or a file ``out``.
 
     Its figures are drawn again, whether or not the case asks for any. Returns the path. Raises
-    UserError where there is no finished run, or one that is not as it was left.
+    UserError if there is no finished run or if its files have changed.
     """
     if out is not None:
         run = told_run(root)
@@ -61,16 +61,16 @@ def write_report(root: Path, out: Path | None = None) -> Path:
 
 
 def check_finished(root: Path) -> OutputFolder:
-    """The folder of a finished run. Raises UserError for anything else."""
+    """Return the folder of a finished run. Raises UserError for anything else."""
     folder = OutputFolder(root)
     folder.check_ended()
     return folder
 
 
 def told_run(root: Path, figures: bool = True) -> ToldRun:
-    """The finished run in a folder, with its figures drawn again if wanted.
+    """Return the finished run in a folder, with its figures drawn again if wanted.
 
-    Raises UserError as :func:`write_report`.
+    Raises UserError as :func:`write_report` does.
     """
     folder = check_finished(root)
     summary = folder.read_summary()

@@ -1,1 +1,1 @@
-"""Running cases: one into its folder, many side by side or on a cluster, and checking them."""
+"""Runs of cases: single, many side by side or on a cluster, and their verification."""

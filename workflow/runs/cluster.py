@@ -1,8 +1,8 @@
-"""The same runs on a cluster: a dask.distributed scheduler hands them to its workers.
+"""Runs on a cluster, distributed to its workers by a dask.distributed scheduler.
 
-Cases and folders are read and written where their paths lead to, on a file system that all machines
-share. A run whose worker dies is taken up by another one, from the last jump. Where none is left,
-that is told, and after an hour of it given up.
+Cases and folders are read and written under their paths, on a file system that all machines share.
+If a worker dies, another one resumes its run from the last saved state. If no worker is left, a
+warning is given, and after an hour the runs are given up.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from workflow.errors import MethodFailed, UserError, one_line
 from workflow.runs.job import Job, run_job
 from workflow.shell.forecast import in_words
 
-# Times a run is tried again where it could not even be started; how often its worker may die is
-# the scheduler's `distributed.scheduler.allowed-failures`, 3 by default.
+# Number of times that starting a run is tried again. How often its worker may die is a setting of
+# the scheduler, `distributed.scheduler.allowed-failures`, 3 by default.
 RETRIES = 2
 # Seconds to wait for the scheduler to answer.
 PATIENCE = "30 s"
-# Seconds between two looks for runs that have ended, and for workers.
+# Seconds between two checks for runs that have ended, and for workers.
 LOOK, WORKERS_LOOK = 0.2, 5.0
-# Seconds without any worker until that is told, until it is told again, and until they are taken to
-# be gone for good; a cluster's queue may bring the first one as late as it likes.
+# Seconds without any worker until a warning, until the next warning, and until the runs are given
+# up. There is no limit for the first worker, which may wait in a cluster's queue.
 TELL, TELL_AGAIN, GIVE_UP = 10.0, 600.0, 3600.0
-# Whose messages are for those who run the cluster.
+# Loggers whose messages are for the administrators of the cluster.
 LOGGERS = "distributed", "tornado"
 LOG = logging.getLogger(__name__)
 
@@ -38,11 +38,10 @@ LOG = logging.getLogger(__name__)
 def run_on_cluster(
     jobs: Sequence[tuple[Job, Case]], out: Path, address: str, end: Callable[[Job, str], None]
 ) -> None:
-    """Run jobs on the workers of the scheduler at ``address`` and ``end`` each with its error.
+    """Run jobs on the workers of the scheduler at ``address``, and call ``end`` with each error.
 
-    Raises UserError if there is no scheduler, MethodFailed where it or all of its workers go away
-    meanwhile. Runs that are no longer wanted, because this process has ended in whatever way, are
-    ended by their workers.
+    Raises UserError if there is no scheduler, MethodFailed if it or all of its workers disappear.
+    Workers end runs that are no longer wanted because this process has ended, in whatever way.
     """
     try:
         from distributed import Client, as_completed
@@ -70,7 +69,7 @@ def run_on_cluster(
 
 
 class _Watch:
-    """Looks after the workers of the scheduler at ``address``, which are to do ``total`` runs."""
+    """Monitor of the workers of the scheduler at ``address``, which have ``total`` runs to do."""
 
     def __init__(self, client: Any, address: str, total: int) -> None:
         self._client, self._address, self._total = client, address, total
@@ -79,14 +78,14 @@ class _Watch:
         self._tell_at = TELL
 
     def failure(self, why: str, left: int) -> MethodFailed:
-        """What to raise where ``left`` runs cannot be waited for."""
+        """Return the exception to raise if ``left`` runs cannot be waited for."""
         return MethodFailed(
             f"--dask {self._address}: {why}, {left} of {self._total} runs not known to have ended; "
             "what is done is kept: the same command goes on"
         )
 
     def look(self, left: int) -> None:
-        """Tell where there is no worker. Raises MethodFailed if that has been so for too long."""
+        """Warn if there is no worker. Raises MethodFailed if there has been none for too long."""
         now = time.monotonic()
         if now < self._looked + WORKERS_LOOK:
             return
@@ -110,19 +109,19 @@ class _Watch:
     def _has_workers(self) -> bool:
         try:
             return bool(self._client.nthreads(callback_timeout=PATIENCE))
-        except Exception:  # what is asked of a scheduler that has gone ends in many ways
+        except Exception:  # requests to a vanished scheduler fail in many ways
             return False
 
 
 def _silence() -> None:
-    """What becomes of the cluster is told in our own words, in one line."""
+    """Suppress the messages of the cluster's packages, which one line of ours replaces."""
     for name in (*LOGGERS, *logging.root.manager.loggerDict):
         if name.partition(".")[0] in LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _submitted(client: Any, jobs: Sequence[tuple[Job, Case]], out: Path) -> dict[Any, Job]:
-    """The jobs, each by what the scheduler will tell of it."""
+    """Submit the jobs, and return them by their futures."""
     futures = {}
     for job, case in jobs:
         settings = {"key": _key(job, case, out), "pure": False, "retries": RETRIES}
@@ -132,13 +131,13 @@ def _submitted(client: Any, jobs: Sequence[tuple[Job, Case]], out: Path) -> dict
 
 
 def _key(job: Job, case: Case, out: Path) -> str:
-    """What the scheduler knows a run by: the same one submitted twice is run once."""
+    """Return the scheduler's key of a run; the same run submitted twice is then run once."""
     parts = f"{out.absolute()}\n{dump_case(case)}"
     return f"{job.name}-{hashlib.sha256(parts.encode()).hexdigest()[:16]}"
 
 
 def _on_worker(job: Job, out: Path) -> str:
-    """Compute a job in a process below the worker, as long as the scheduler wants it."""
+    """Compute a job in a child process of the worker, as long as the scheduler wants it."""
     from distributed import get_worker
 
     worker = get_worker()
@@ -148,12 +147,13 @@ def _on_worker(job: Job, out: Path) -> str:
         task = worker.state.tasks.get(key)
         return task is None or task.state == "cancelled"
 
-    # The scheduler gives a run to one worker at a time, and has seen the last one die.
+    # The lock can be taken over, because the scheduler gives a run to one worker at a time and only
+    # after the last one has died.
     return run_job(job, out, unwanted, take_over=True)
 
 
 def _error_of(future: Any) -> str:
-    """What the run said, or what became of it where no worker could say."""
+    """Return the error of the run, or why no worker could report one."""
     try:
         return str(future.result())
     except Exception as error:

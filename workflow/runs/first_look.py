@@ -1,4 +1,4 @@
-"""Where to look first in the folder of a finished run, or of many."""
+"""Hints on where to look first in the folder of a finished run, or of many."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ REPORT, FIGURES = "report.html", "figures"
 
 
 def first_look(root: Path, drawn: Sequence[str]) -> Iterator[str]:
-    """Lines with the report, one figure and one file for ParaView, of those that there are.
+    """Yield lines with the report, one figure and one file for ParaView, as far as they exist.
 
-    ``drawn`` are the names of the figures, the first of which is to be looked at.
+    ``drawn`` are the names of the figures; the first one is shown.
     """
     found = {
         "report": root / REPORT if (root / REPORT).exists() else None,
@@ -26,13 +26,13 @@ def first_look(root: Path, drawn: Sequence[str]) -> Iterator[str]:
 
 
 def look_at(root: Path, places: Mapping[str, Path | str]) -> Iterator[str]:
-    """Lines with the folder of what is done, and the ``places`` there that tell most by name."""
+    """Yield lines with the folder of finished work and its most informative ``places``, by name."""
     yield f"done: {root}" + ("; look first at" if places else "")
     for name, path in places.items():
         yield f"  {name:<8}  {path}"
 
 
 def _paraview(root: Path) -> str | None:
-    """The command that shows a run in ParaView."""
+    """Return the command that shows a run in ParaView, or None if it has no such files."""
     script = first_file(root)
     return None if script is None else f"paraview --script={script}"

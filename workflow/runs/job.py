@@ -1,7 +1,7 @@
 """One run of many: its folder, and the separate process that computes it.
 
-The process ends when whoever started it ends, however that ends, and its contact workers with it.
-Interrupted or killed it leaves a folder that :func:`workflow.runs.run.bring_to_end` takes up.
+The process and its contact workers end when the process that started them ends, in whatever way.
+After an interruption :func:`workflow.runs.run.bring_to_end` resumes the run from its folder.
 """
 
 from __future__ import annotations
@@ -27,28 +27,28 @@ from workflow.runs.run import bring_to_end
 from workflow.shell.folder import OutputFolder
 from workflow.shell.processes import THREAD_SETTINGS
 
-# Seconds between two looks at whether a run is still wanted.
+# Seconds between two checks of whether a run is still wanted.
 LOOK = 0.2
-# What the process runs; its only argument is the job.
+# Code that the process runs; its only argument is the job.
 COMMAND = "from workflow.runs.job import main; main()"
 
 
 @dataclass(frozen=True)
 class Job:
-    """A case with overrides (``"wear.cycles=1e4"``) to run in the folder ``name``."""
+    """Case with overrides (``"wear.cycles=1e4"``) to run in the folder ``name``."""
 
     name: str
     case: Path
     overrides: tuple[str, ...] = ()
 
     def load(self) -> Case:
-        """The case to run. Raises CaseError."""
+        """Return the case to run. Raises CaseError."""
         return load_case(self.case, self.overrides)
 
 
 @dataclass(frozen=True)
 class Finished:
-    """How a job ended: ``summary`` is that of its run, None where ``error`` says why not."""
+    """Result of a job: the ``summary`` of its run, or None if ``error`` says why there is none."""
 
     job: Job
     folder: Path
@@ -60,8 +60,8 @@ class Finished:
 
 
 def main() -> None:
-    """Compute the job given as the only argument and say on stdout how it ended."""
-    # Whatever a library prints goes to stderr; stdout is for the answer.
+    """Compute the job given as the only argument, and report on stdout how it ended."""
+    # Output of libraries goes to stderr, because stdout is for the answer.
     answer = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -82,7 +82,7 @@ def main() -> None:
 
 
 def _end_with_parent() -> None:
-    """End when the other end of stdin closes: nobody writes to it."""
+    """End this process when stdin, to which nobody writes, is closed by the end of the parent."""
     os.read(0, 1)
     os._exit(1)
 
@@ -97,10 +97,10 @@ def run_job(
     one_thread: bool = True,
     take_over: bool = False,
 ) -> str:
-    """Compute a job in a fresh process; the error in one line, "" if none.
+    """Compute a job in a new process; return the error in one line, or "" if there is none.
 
-    It is ended when it is ``unwanted``. It has a separate process group, so that Ctrl-C comes to
-    whoever waits, and only there. For ``take_over`` see :func:`workflow.shell.lock.locked`.
+    The process is ended if ``unwanted`` returns true. It has a separate process group, so that only
+    the waiting process receives Ctrl-C. For ``take_over`` see :func:`workflow.shell.lock.locked`.
     """
     arguments = asdict(job) | {"case": str(job.case.absolute()), "out": str(out.absolute())}
     arguments["take_over"] = take_over
@@ -128,7 +128,7 @@ def run_job(
 
 
 def _wait(process: subprocess.Popen[str], unwanted: Callable[[], bool]) -> tuple[str, str]:
-    """What the process wrote to stdout and stderr until its end."""
+    """Wait for the end of the process, and return what it wrote to stdout and stderr."""
     while True:
         try:
             return process.communicate(timeout=LOOK)
@@ -138,7 +138,7 @@ def _wait(process: subprocess.Popen[str], unwanted: Callable[[], bool]) -> tuple
 
 
 def _ending(process: subprocess.Popen[str], answer: str, stderr: str) -> str:
-    """Why the job failed, in one line; "" if it did not."""
+    """Return why the job failed, in one line, or "" if it did not."""
     if process.returncode == 0 and answer:
         return one_line(json.loads(answer)["error"])
     if process.returncode < 0:
@@ -149,7 +149,7 @@ def _ending(process: subprocess.Popen[str], answer: str, stderr: str) -> str:
 
 
 def finished(job: Job, out: Path, error: str) -> Finished:
-    """A job that has ended, with the summary that its run left."""
+    """Return a job that has ended, with the summary of its run."""
     root = out / job.name
     if not error and not OutputFolder(root).summary.exists():
         error = f"{root}: finished, but its summary is not to be seen here: is the folder shared?"

@@ -1,6 +1,6 @@
-"""Many runs in folders: each in a fresh process, as many at once as there are cores, or one by one.
+"""Runs of many cases in folders: in separate processes side by side, or one after the other.
 
-What is finished stays, what was interrupted is taken up, and a run that fails is a value.
+Finished runs are reused, interrupted ones are resumed, and a run that fails is returned as a value.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ def run_jobs(
     report: Callable[[Finished], None] | None = None,
     running: Callable[[Sequence[str]], None] = lambda names: None,
 ) -> list[Finished]:
-    """Run every job in the folder of its name below ``out``; in the order of ``jobs``.
+    """Run every job in the folder of its name below ``out``; return them in the order of ``jobs``.
 
-    A finished run of the same case is taken as it is, an unfinished wear run goes on from its last
-    jump, anything else in such a folder is run anew. A job that fails is a :class:`Finished` with
-    its ``error``. Local runs share ``processes`` cores (default: all there are), of which each
-    takes as many as it has contacts; run ``alone``, one after the other, they have all cores and
-    threads as by themselves. ``dask`` is the address of a scheduler to send them to instead.
-    ``report`` is called with each job as it ends, ``running`` with the names of those that run here
-    whenever these change. Ctrl-C ends all of them; another call goes on.
+    A finished run of the same case is reused, an unfinished wear run is resumed from its last saved
+    state, and anything else in such a folder is run again. A job that fails is returned as a
+    :class:`Finished` with its ``error``. Local runs share ``processes`` cores (default: all); each
+    takes as many as it has contacts. With ``alone`` they run one after the other, each with all
+    cores and threads. ``dask`` is the address of a scheduler that runs them instead. ``report`` is
+    called with each job as it ends, ``running`` with the names of the jobs running here whenever
+    they change. Ctrl-C ends all of them; another call resumes them.
 
-    Raises ValueError where two jobs would share a folder.
+    Raises ValueError if two jobs would share a folder.
     """
     _check_names(jobs)
     ended: dict[str, Finished] = {}
@@ -57,7 +57,7 @@ def run_jobs(
             end(job, one_line(error))
             continue
         root = out / job.name
-        # What one had no time to remove is removed by whoever would take it up.
+        # A finished run with leftovers is not reused here: resuming it removes them.
         if kept_in(root, case) == "finished" and not OutputFolder(root).has_leftovers:
             end(job, "")
         else:
@@ -87,7 +87,7 @@ def _run_here(
     tell: Callable[[Sequence[str]], None],
     one_thread: bool,
 ) -> None:
-    """Run jobs side by side, first come, first served; one that wants more cores runs alone."""
+    """Run jobs side by side in their order; one that needs more cores than there are runs alone."""
     stop = threading.Event()
     queue = [(job, min(case.cores, cores)) for job, case in jobs]
     running: dict[Future[str], tuple[Job, int]] = {}

@@ -1,4 +1,4 @@
-"""What the numbers of a run come from: its case, the files that this names, what was chosen."""
+"""Provenance of the results of a run: its case, the files that this names, and chosen settings."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from workflow.kinds import load_case
 from workflow.shell.folder import OutputFolder
 from workflow.shell.store import file_digest
 
-# Entries that no number depends on: pictures may be switched off before a run goes on.
+# Entries that do not affect the results: pictures may be switched off before a run is resumed.
 FREE = {"title", "output", "assumed", "measured", "expect"}
 
 
 def provenance_of(folder: OutputFolder, case: Case) -> dict[str, Any]:
-    """Of a run of the case in its folder, in what JSON can say."""
+    """Return the provenance of a run of the case in its folder, as JSON values."""
     files: dict[str, str] = {}
     _add_files(case, files)
     return {
@@ -28,13 +28,13 @@ def provenance_of(folder: OutputFolder, case: Case) -> dict[str, Any]:
 
 
 def case_values(folder: OutputFolder) -> dict[str, Any]:
-    """The entries of the case in a folder that its numbers depend on, as they are written there."""
+    """Return the entries of the case in a folder that affect the results, as they are written."""
     written = Source(str(folder.case), read_text(folder.case)).data
     return {name: value for name, value in written.items() if name not in FREE}
 
 
 def _add_files(case: Case, files: dict[str, str]) -> None:
-    """The digests of files that a case names, and of those that cases among them name."""
+    """Add the digests of the files that a case names, including those that its sub-cases name."""
     for file in files_of(case):
         if file not in files:
             files[file] = file_digest(Path(file))
@@ -42,4 +42,4 @@ def _add_files(case: Case, files: dict[str, str]) -> None:
                 try:
                     _add_files(load_case(file), files)
                 except CaseError:
-                    continue  # whoever needs it says so, and why
+                    continue  # the code that needs the file reports it

@@ -1,4 +1,4 @@
-"""A run of any kind of case: its folder, its log, and where an earlier one has got to."""
+"""Run of a case of any kind in its folder, from the start or from where an earlier run stopped."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ from workflow.shell.run_time import RunTime
 from workflow.shell.screen import Loudness, Screen
 from workflow.shell.store import read_bytes
 
-# Seconds in which a process that was cut off, or whoever started it, has come to its end.
+# Seconds after which an interrupted process, and the process that started it, have surely ended.
 PATIENCE = 60.0
 
 Kept = Literal["finished", "unfinished", "other", "nothing"]
 
 
 def run_case(case: Case, out: Path, force: bool, loudness: Loudness = Loudness.NORMAL) -> None:
-    """Run a case from the start into a folder, by the cheapest model if it leaves that open.
+    """Run a case from the start in a folder, with the cheapest model if the case leaves it open.
 
-    Raises FretscaleError; UserError too where another process works in the folder.
+    Raises FretscaleError, in particular UserError if another process works in the folder.
     """
     with _working(case, out) as gone:
         _start(case, out, force, gone, loudness=loudness)
 
 
 def resume_run(out: Path, loudness: Loudness = Loudness.NORMAL) -> bool:
-    """Continue the run in a folder from its last whole jump; False if it is finished already.
+    """Resume the run in a folder from its last saved state; return False if it is finished.
 
-    What a finished one had no time to remove is removed.
+    Temporary files that a finished run did not remove are removed.
     """
     folder = OutputFolder(out)
     folder.check_run()
@@ -69,10 +69,10 @@ def resume_run(out: Path, loudness: Loudness = Loudness.NORMAL) -> bool:
 def bring_to_end(
     case: Case, root: Path, take_over: bool = False, loudness: Loudness = Loudness.NORMAL
 ) -> bool:
-    """Bring a case to its end in a folder, from where that has got to; False if it was there.
+    """Complete a case in a folder, resuming an earlier run; return False if it was finished.
 
-    A finished run of the same case stays, an unfinished one goes on from its last jump if it can,
-    and what else the folder has of earlier runs gives way. For ``take_over`` see
+    A finished run of the same case is reused, an unfinished one is resumed from its last saved
+    state if possible, and other files of earlier runs are replaced. For ``take_over`` see
     :func:`workflow.shell.lock.locked`. Raises FretscaleError.
     """
     with _working(case, root, PATIENCE, take_over) as gone:
@@ -89,15 +89,15 @@ def bring_to_end(
 
 
 def kept_in(root: Path, case: Case) -> Kept:
-    """What a folder has of this case; "other" is a run of another case.
+    """Return what kind of run a folder has of this case; "other" is a run of another case.
 
-    A run whose files are not as it left them, or not of the same input files, is "nothing".
+    A run whose files, or whose input files, have changed counts as "nothing".
     """
     return _kept_and_damaged(root, case)[0]
 
 
 def _kept_and_damaged(root: Path, case: Case) -> tuple[Kept, str]:
-    """What a folder has of this case, and why that cannot be believed if there is more."""
+    """Return what a folder has of this case, and why a damaged run there cannot be used."""
     folder, record, damaged = OutputFolder(root), None, ""
     if not folder.case.exists():
         return "nothing", ""
@@ -106,7 +106,7 @@ def _kept_and_damaged(root: Path, case: Case) -> tuple[Kept, str]:
         record = folder.read_summary().get("choice") if finished else folder.choice
     except UserError as error:
         damaged = str(error)
-    # As a run of it was claimed, after its open settings had been chosen.
+    # The folder has the case with its open settings chosen, so the comparison needs the same.
     if not _is_case(folder.case, changed(case, (record or {}).get("chosen", {}))):
         return "other", ""
     try:
@@ -123,7 +123,7 @@ def _kept_and_damaged(root: Path, case: Case) -> tuple[Kept, str]:
 
 
 def _state(folder: OutputFolder, case: Case) -> StoredState | None:
-    """What an unfinished run goes on from; None if it left nothing before it was cut off."""
+    """Return the state that an unfinished run resumes from; None if none was saved."""
     if not folder.checkpoint.exists():
         return None
     return checkpoint.load(folder, provenance_of(folder, case))
@@ -135,8 +135,8 @@ def _working(
 ) -> Iterator[str]:
     """Hold the folder of a run (see :func:`workflow.shell.lock.locked`).
 
-    Raises NotWritten where the disk is full, and KeyboardInterrupt when it is stopped, with what
-    goes on from there.
+    Raises NotWritten if the disk is full, and KeyboardInterrupt if the run is stopped; their
+    messages say how to resume.
     """
     try:
         with locked(out, patience, take_over) as gone:
@@ -163,8 +163,8 @@ def _start(
 ) -> None:
     """Run a case from the start.
 
-    ``gone`` is what to tell of a process that was there before, ``damaged`` why its run is not
-    believed.
+    ``gone`` is a message about an earlier process in the folder, ``damaged`` says why its run
+    cannot be used.
     """
     analysis = analysis_of(case)
     check_measured(case, analysis.curves)
@@ -182,7 +182,7 @@ def _start(
 def _go_on(
     case: Case, folder: OutputFolder, gone: str, loudness: Loudness = Loudness.NORMAL
 ) -> None:
-    """Continue the run in a folder."""
+    """Resume the run in a folder."""
     analysis, out = analysis_of(case), folder.root
     if not analysis.resumable:
         raise UserError(
@@ -271,19 +271,19 @@ def _run(
 
 
 def _names(pictures: Callable[[], Pictures], case: Case, contents: Any) -> list[str]:
-    """Figures of a run. Where none are asked for, what draws is not loaded."""
+    """Return the figures of a run, without loading the plotting library if none are wanted."""
     return list(pictures().figures_of(contents)) if case.output.figure_formats else []
 
 
 def _share(analysis: Analysis, case: Case) -> Share:
-    """What of the pictures of a run the process beside it has a share of."""
+    """Return the share of the pictures of a run that the worker process draws."""
     output = case.output
     alone = analysis.beside == "files" and not output.paraview
     return "nothing" if alone or not output.figure_formats else analysis.beside
 
 
 def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -> None:
-    """Say what runs, about how long, and what in the case is hardly meant."""
+    """Report which case runs, about how long, and the plausibility warnings of the case."""
     long = not resume and expected.seconds >= SHORT_RUN
     takes = f" ({expected.short})" if long else ""
     reporter.say(f"{'resume' if resume else 'run'}: {case.title}{takes}")
@@ -292,7 +292,7 @@ def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -
 
 
 def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
-    """What a run that got Ctrl-C has left, and the command that goes on."""
+    """Return what a run has left after Ctrl-C, and the command that resumes it."""
     out = folder.root
     if not folder.case.exists():
         return f"{out} has nothing yet; start again with the same command"
@@ -304,7 +304,7 @@ def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
 
 
 def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None:
-    """Write the page of a run."""
+    """Write the report of a run."""
     told = ToldRun(
         case=run.case,
         case_text=read_bytes(run.folder.case).decode("utf-8"),
@@ -317,7 +317,7 @@ def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None
 
 
 def _is_case(path: Path, case: Case) -> bool:
-    """Whether the file says this case, perhaps in the words of another version."""
+    """Return whether the file contains this case, possibly written by another version."""
     if read_bytes(path) == dump_case(case).encode("utf-8"):
         return True
     try:

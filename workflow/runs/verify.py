@@ -1,4 +1,4 @@
-"""Run cases and compare what they computed with what they expect."""
+"""Verification of cases: runs them and compares the results with the expected values."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from workflow.shell.screen import console as terminal
 from workflow.shell.summary import QuantityError
 
 COLUMNS = "expected", "computed", "unit", "error", "verdict", "kind", "source"
-# Columns of text where the table goes to a file.
+# Width of the table in columns of text when it is written to a file.
 FILE_WIDTH = 140
 
 
 def verify_cases(cases: tuple[Path, ...], out: Path, loudness: Loudness = Loudness.NORMAL) -> bool:
-    """Run each case into its own folder under ``out``; True if every expectation is met.
+    """Run each case in a folder under ``out``; return True if every expectation is met.
 
-    Where it is quiet, only what was missed is told, a line for each.
+    In quiet mode only missed expectations are printed, one line for each.
     """
     loaded = [(path, load_case(path)) for path in cases]
     for path, case in loaded:

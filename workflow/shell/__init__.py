@@ -1,1 +1,1 @@
-"""What runs of all kinds share: folder, reporter, results, memory, cache, processes."""
+"""Infrastructure shared by all runs: folder, reporter, results, memory, cache and processes."""

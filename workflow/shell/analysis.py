@@ -1,4 +1,4 @@
-"""An analysis as the shell and the commands know it: one frozen description, and nothing else."""
+"""Description of an analysis, the only thing that the shell and the commands know about it."""
 
 from __future__ import annotations
 
@@ -24,23 +24,42 @@ if TYPE_CHECKING:
 AnyCase = TypeVar("AnyCase", bound=Case)
 Summary = Mapping[str, Any]
 Share = Literal["nothing", "files", "pictures"]
-"""What of its pictures a run shares with a second process: files for ParaView, or figures too."""
+"""Output that a second process helps to draw: none, files for ParaView, or figures as well."""
 
 
 @dataclass(frozen=True)
 class Run(Generic[AnyCase]):
-    """A run that an analysis is to bring to its end.
+    """Run that an analysis has to complete.
 
-    ``kind`` is the name of its kind of case. It goes on from where ``folder`` has got to if it is
-    to ``resume``, with the state in ``kept``, None where it left none before it was cut off.
-    ``provenance`` is what its numbers come from, by which its files are known again.
-    ``choice`` is the record of the settings that were chosen for the case, None
-    where they stand as written. ``compute`` runs another case file into a folder, from where an
-    earlier run there has got to; False if that was finished already. ``draw`` writes the pictures
-    of the results that the case asks for, told what these hold. ``measured`` tells how far these
-    are from what was measured, as the summary has it. ``report`` puts the summary that
-    the run is to end with, and what was drawn, on a page for people. ``beside`` is a process for
-    what need not wait, which draws at the end.
+    Attributes
+    ----------
+    kind
+        Name of the kind of case.
+    case
+        The case with all its settings.
+    folder
+        Output folder of the run.
+    reporter
+        Receives progress, log lines and warnings.
+    resume
+        Whether to continue from the state stored in ``folder``.
+    kept
+        Stored state to resume from; None if the earlier run stored none before it stopped.
+    provenance
+        Origin of the results, by which stored files are checked before they are used again.
+    choice
+        Record of the settings that were chosen for the case; None if all stand as written.
+    compute
+        Runs another case file into a folder, resuming an earlier run there; returns False if that
+        run was already finished.
+    draw
+        Draws the pictures that the case asks for, given the contents of the results.
+    measured
+        Returns the comparison with measured points, in the form stored in the summary.
+    report
+        Writes the report from the final summary and the figures.
+    beside
+        Worker process for work that the run need not wait for; it draws at the end.
     """
 
     kind: str
@@ -60,12 +79,13 @@ class Run(Generic[AnyCase]):
 
 @dataclass(frozen=True)
 class Pictures:
-    """How results are shown.
+    """Functions that show the results of an analysis.
 
-    Both are told what the results hold: a frozen description that the run makes of what it has
-    written. ``figures_of`` gives the figures to draw, by name; ``write_paraview`` writes files for
-    ParaView into a folder and gives their paths, None for cases without fields. ``contents`` is the
-    type of that description, for results whose run has ended; None where there is nothing to tell.
+    Both functions receive a frozen description of the contents of the results, which the run makes
+    from what it has written. ``figures_of`` returns the functions that draw figures, by name.
+    ``write_paraview`` writes files for ParaView into a folder and returns their paths; it is None
+    for cases without fields. ``contents`` is the type of the description, needed to read the
+    results of a finished run; it is None if the description is empty.
     """
 
     figures_of: Callable[[Any], Mapping[str, Callable[[h5py.File], Figure]]]
@@ -74,29 +94,41 @@ class Pictures:
 
 
 def as_written(case: Any) -> tuple[Any, None]:
-    """The case, and no record: nothing is to choose."""
+    """Return the case unchanged and None: no setting is left open."""
     return case, None
 
 
 def no_quantities(case: Any, summary: Summary) -> Sequence[Quantity]:
-    """None, of an analysis that names none."""
+    """Return no quantities, for an analysis that names none."""
     return ()
 
 
 def expected(case: Case, summary: Summary) -> list[str]:
-    """What a case expects to find; of 0 there is no relative error."""
+    """Return the expected quantities of a case; a value of 0 is left out (no relative error)."""
     return [entry.quantity for entry in case.expect if entry.value]
 
 
 @dataclass(frozen=True)
 class Comparison(Generic[AnyCase]):
-    """How a chart compares two runs of an analysis.
+    """Rules by which a chart compares two runs of an analysis.
 
-    ``quantities`` are dotted paths into the summary, ``extras`` those told beside them,
-    ``sections`` those of the middle of the faces, and ``at_the_end`` those that do not depend on
-    which increments are computed. ``plain`` are overrides that leave out what a chart has no use
-    for, unless it asks for a quantity below the entry. ``measured`` is the summary with what only
-    the results in the folder tell, ``apart`` how far they are from those in another, by name.
+    Attributes
+    ----------
+    quantities
+        Returns the dotted paths into the summary that are compared.
+    extras
+        Returns the paths of further quantities to report.
+    sections
+        Returns the paths of quantities at the middle of the faces.
+    at_the_end
+        Quantities that do not depend on which increments are computed.
+    plain
+        Overrides that switch off output a chart does not need, by the entry that they affect; not
+        applied if the chart asks for a quantity below that entry.
+    measured
+        Returns the summary, extended by quantities that only the results in the folder contain.
+    apart
+        Returns the differences between the results in two folders, by name.
     """
 
     quantities: Callable[[AnyCase, Summary], list[str]] = expected
@@ -110,20 +142,41 @@ class Comparison(Generic[AnyCase]):
 
 @dataclass(frozen=True)
 class Analysis(Generic[AnyCase]):
-    """All that the shell and the commands know of an analysis.
+    """Description of an analysis for the shell and the commands.
 
-    ``cases`` are its kinds of case by the names that ``fretscale new`` has for them; these say
-    themselves how they are told apart, what they would run and on how many cores. ``memory`` is
-    what a run needs before anything is meshed, ``run_time`` about how long it takes, ``pictures``
-    how its results are shown, and ``beside`` what of these a second process has a share of: not
-    figures where to draw them takes less than the half second in which it would load what draws.
-    ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`),
-    by their steps (:mod:`workflow.shell.steps`) or a state of their own.
-    ``quantities`` are the main results, for all that show or compare runs, ``curves`` what is drawn
-    over each other where runs are compared.
-    ``choose`` gives the case with the settings that it leaves open, and a record of why.
-    ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
-    folder, ``draw_faces`` draws the faces of these into one; None where there is no structure.
+    Attributes
+    ----------
+    name
+        Name of the analysis.
+    cases
+        Kinds of case by their names in ``fretscale new``.
+    run
+        Function that completes a run.
+    memory
+        Estimates the memory that a run needs, before anything is meshed.
+    run_time
+        Estimates how long a run takes.
+    quantities
+        Returns the main results, for everything that shows or compares runs.
+    curves
+        Curves that are drawn over each other where runs are compared.
+    pictures
+        Returns the functions that show the results.
+    beside
+        Output that a second process helps to draw; figures are excluded if drawing them takes less
+        than the half second in which that process would load the plotting library.
+    resumable
+        Whether a run writes a checkpoint (:mod:`workflow.shell.checkpoint`), of its steps
+        (:mod:`workflow.shell.steps`) or of a state that the analysis defines.
+    choose
+        Returns the case with the settings that it leaves open, and a record of the reasons.
+    comparison
+        Rules by which charts compare two runs.
+    write_loads
+        Solves only the structure of a case and writes the loads of its contacts into a folder; None
+        if there is no structure.
+    draw_faces
+        Draws the contact faces of the structure into a folder; None if there is no structure.
     """
 
     name: str

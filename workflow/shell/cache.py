@@ -1,6 +1,6 @@
-"""Condensed structures and solved cycles on disk, found again by what they were made from.
+"""Cache of condensed structures and solved cycles on disk, found by the inputs they were made from.
 
-A file that is not what was written under its key is passed over, and said to be.
+A file that differs from what was written under its key is ignored, with a warning.
 """
 
 from __future__ import annotations
@@ -32,24 +32,24 @@ LOG = logging.getLogger(__name__)
 # Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB for
 # its joint and 133 MB for its bodies.
 LARGEST_CACHE = 4 * 1024**3
-# Files by what is in them and the hash of what they were made from.
+# Names of files: the kind of content and the hash of the inputs it was made from.
 NAME = re.compile(r"[a-z]+-[0-9a-f]{32}\.h5")
 SOLVERS = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 
 def cache_folder() -> Path:
-    """``FRETSCALE_CACHE``, or ``fretscale`` in the user's cache folder."""
+    """Return the folder ``FRETSCALE_CACHE``, or ``fretscale`` in the user's cache folder."""
     return Path(os.environ.get("FRETSCALE_CACHE", user_cache_path("fretscale", appauthor=False)))
 
 
 def content_key(*parts: object) -> str:
-    """Hash of the parts, of the structural code and of the packages it relies on."""
+    """Return a hash of the parts, of the structural code and of the packages it relies on."""
     return hashlib.sha256(repr(parts).encode() + _code()).hexdigest()[:32]
 
 
 @cache
 def _code() -> bytes:
-    """Digest of the structural code and of the packages it relies on, read once."""
+    """Return a digest of the structural code and of the packages it relies on, computed once."""
     digest = hashlib.sha256()
     for package in (fe_models, sa_solver):
         assert package.__file__ is not None
@@ -60,7 +60,7 @@ def _code() -> bytes:
 
 
 class DiskStore:
-    """Condensed bodies, joints and cycles in the cache folder.
+    """Store of condensed bodies, joints and cycles in the cache folder.
 
     It is a :class:`workflow.models.structure.StructureStore`.
     """
@@ -161,13 +161,13 @@ def _digest(array: np.ndarray) -> tuple[str, tuple[int, ...], str]:
 
 
 def load_arrays(name: str) -> dict[str, Any] | None:
-    """Named arrays kept under that name, or None."""
+    """Return the named arrays stored under ``name``, or None if there are none."""
     kept = _load(name)
     return None if kept is None else kept[0]
 
 
 def save_arrays(name: str, arrays: dict[str, Array]) -> None:
-    """Keep named arrays."""
+    """Store named arrays under ``name``."""
     _save(name, arrays, {})
 
 
@@ -184,7 +184,7 @@ def _load(name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
 
 
 def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> None:
-    """Write a file; a cache that cannot be written is no error."""
+    """Write a file, or do nothing if the cache folder cannot be written."""
     folder = cache_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -195,7 +195,7 @@ def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> No
 
 
 def kept_files(folder: Path) -> list[Path]:
-    """What is kept in a cache folder, and nothing that somebody else has put there."""
+    """Return the cache files in a folder; files of other programs are left out."""
     return [path for path in folder.glob("*.h5") if NAME.fullmatch(path.name)]
 
 

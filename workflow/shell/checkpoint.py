@@ -1,7 +1,7 @@
-"""What an unfinished run goes on from: its last state, tied by content to its case and its jumps.
+"""Checkpoint of an unfinished run: its last state, tied to its case and to its files by digests.
 
-The state on disk knows what its numbers come from and the digest of every file of a jump before
-it. All of that is looked at before a resumed run computes anything.
+The file on disk stores the provenance of the run and the digest of every file of steps written
+before it. Both are checked before a resumed run computes anything.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from workflow.errors import UserError
 from workflow.shell.folder import CHOICE, OutputFolder
 from workflow.shell.store import DamagedFile, checked_digest, read_arrays, write_arrays
 
-# Names beside those of the analysis.
+# Names of arrays in the checkpoint that are added to those of the analysis.
 PROVENANCE, JUMPS = "provenance", "jumps"
-# What a message says of an entry that only the other case has.
+# Text of a message for the value of an entry that only the other case has.
 ABSENT = "not given"
 
 
 @dataclass(frozen=True)
 class StoredState:
-    """The last state of a run, as its analysis keeps it, and the digests of all its jumps."""
+    """Last stored state of a run and the digests of all its files of steps."""
 
     arrays: Mapping[str, Any]
     attributes: Mapping[str, Any]
@@ -34,13 +34,16 @@ class StoredState:
 
 
 def save(folder: OutputFolder, state: StoredState, provenance: Mapping[str, Any]) -> None:
-    """Write the state; the old file stays until the new one is whole."""
+    """Write the state; the old file remains until the new one is complete."""
     ties = {PROVENANCE: json.dumps(provenance), JUMPS: np.array(state.jumps, dtype="S64")}
     write_arrays(folder.checkpoint, {**state.arrays, **ties}, state.attributes)
 
 
 def load(folder: OutputFolder, provenance: Mapping[str, Any]) -> StoredState:
-    """The last state. Raises UserError unless it, its jumps and its case belong together."""
+    """Return the last state.
+
+    Raises UserError if the state, its files of steps and the case do not belong together.
+    """
     try:
         arrays, attributes = read_arrays(folder.checkpoint)
         begun = json.loads(arrays.pop(PROVENANCE))
@@ -65,7 +68,7 @@ def load(folder: OutputFolder, provenance: Mapping[str, Any]) -> StoredState:
 
 
 def _changed(folder: OutputFolder, begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """What has another content now than when the run was begun."""
+    """Return a message that names the input whose content has changed since the run began."""
     if begun["case"] != now["case"]:
         return f"{folder.case}: {_entry(begun['case'], now['case'])}"
     files = now["input_files"]
@@ -74,7 +77,7 @@ def _changed(folder: OutputFolder, begun: Mapping[str, Any], now: Mapping[str, A
 
 
 def _entry(begun: Any, now: Any, place: str = "") -> str:
-    """The first entry of two different cases that they do not share."""
+    """Return a message on the first entry in which two different cases differ."""
     if isinstance(begun, dict) and isinstance(now, dict):
         values = {key: (begun.get(key, ABSENT), now.get(key, ABSENT)) for key in {**begun, **now}}
     elif isinstance(begun, list) and isinstance(now, list) and len(begun) == len(now):

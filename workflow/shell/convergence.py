@@ -1,4 +1,4 @@
-"""How far the finest rung of a ladder is from the limit that the ladder goes to."""
+"""Error estimate for the finest of a series of refined solutions (Richardson extrapolation)."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from math import inf, isfinite, log
 
 from scipy.optimize import brentq
 
-# Orders outside are no observation but chance: values that hardly converge, or agree by accident.
+# An observed order outside these bounds is an accident: the values hardly converge, or agree by
+# chance.
 LOWEST_ORDER, HIGHEST_ORDER = 0.2, 6.0
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """What the last three rungs say of the last.
+    """Observed convergence order and estimated error of the finest solution of a series.
 
-    ``order`` is the observed one, None where the values do not approach a limit in one direction;
-    ``error`` estimates the distance of the last value from the limit, in its unit.
+    ``order`` is None where the values do not approach a limit monotonically. ``error`` estimates
+    the distance of the last value from the limit, in its unit.
     """
 
     order: float | None
@@ -27,14 +28,15 @@ class Convergence:
 def richardson(
     values: Sequence[float], steps: Sequence[float], order: float, noise: float = 0.0
 ) -> Convergence:
-    """Convergence of the last of ``values``, found with steps that go to zero.
+    """Estimate the error of the last of ``values``, computed with ``steps`` that decrease to zero.
 
-    f(h) = f(0) + C h^p through the last three rungs gives p, and |f(h) - f(0)| at the last one with
-    p or ``order``, whichever is lower (Roache 1994, doi:10.1115/1.2910291; for steps in any ratio
-    Celik et al. 2008, doi:10.1115/1.2960953). Where the three have no credible order but the last
-    change is the smaller one, the error is that change: values that swing have their limit between
-    the last two. Otherwise it is the largest difference of the three. Changes below ``noise`` are
-    none. Two rungs say no more than their difference, and a single one nothing: infinite.
+    The model f(h) = f(0) + C h^p through the last three values gives p. The error
+    |f(h) - f(0)| at the last value uses the lower of p and ``order`` (Roache 1994,
+    doi:10.1115/1.2910291; for steps in any ratio Celik et al. 2008, doi:10.1115/1.2960953).
+    Without a credible order, the error is the last change if that is the smaller of the two
+    changes, since oscillating values have their limit between the last two; otherwise it is the
+    largest difference of the three values. Changes below ``noise`` count as zero. Two values give
+    their difference as the error, a single value an infinite error.
     """
     if len(values) < 2:
         return Convergence(None, inf)
@@ -53,7 +55,7 @@ def richardson(
 
 
 def _order(before: float, after: float, *steps: float) -> float | None:
-    """p with (h1^p - h2^p) / (h2^p - h3^p) = before / after, None if there is none."""
+    """Solve (h1^p - h2^p) / (h2^p - h3^p) = before / after for p; return None if impossible."""
     if after == 0.0 or before / after <= 0.0:
         return None
     wanted = log(before / after)

@@ -12,7 +12,7 @@ from sa_solver.types import Array
 from workflow.shell.quantities import ANY, LAST, CurvesOf
 from workflow.shell.results import grid_of
 
-# Attributes of a group that say what its number stands for, in words.
+# Attributes of a numbered group that say in words what its number stands for.
 TELLING = {
     "force": "under {:g} N",
     "level": "at level {:g}",
@@ -22,7 +22,7 @@ TELLING = {
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve ``(n,)`` in base units, its ends and dots named by what it is of."""
+    """Curve ``(n,)`` in base units, with a title, the names of its axes and their units."""
 
     title: str
     x: Array
@@ -35,7 +35,7 @@ class Curve:
 
 
 def curves_in(file: h5py.File, wanted: CurvesOf) -> Iterator[Curve]:
-    """Those of the curves that a file has."""
+    """Yield the curves of the description ``wanted`` that a file contains."""
     for place, stood, words in _walk(file, wanted.y.split("/"), "", [], []):
         path = _with_last(wanted.x, place)
         for name in stood:
@@ -63,7 +63,7 @@ def _last_part(dataset: h5py.Dataset) -> str:
 def _walk(
     group: h5py.Group, parts: list[str], above: str, stood: list[str], words: list[str]
 ) -> Iterator[tuple[str, list[str], list[str]]]:
-    """Paths of all that a pattern leads to, what stands in it for any group, and that in words."""
+    """Yield each path that matches a pattern, the groups that replace ``*``, and their wording."""
     part, *rest = parts
     for name in _names(group, part):
         place, item, now = f"{above}{name}", group[name], (stood, words)
@@ -76,7 +76,7 @@ def _walk(
 
 
 def _names(group: h5py.Group, part: str) -> list[str]:
-    """What of a group a part of a pattern means."""
+    """Return the names in a group that match one part of a pattern."""
     if part == ANY:
         return [name for name, item in group.items() if isinstance(item, h5py.Group)]
     if part == LAST:
@@ -85,7 +85,7 @@ def _names(group: h5py.Group, part: str) -> list[str]:
 
 
 def _with_last(path: str, place: str) -> str:
-    """The path with the numbered group of ``place`` in it, part by part."""
+    """Return the path with each ``-1`` replaced by the part of ``place`` at that position."""
     there = place.split("/")
     return "/".join(there[n] if part == LAST else part for n, part in enumerate(path.split("/")))
 

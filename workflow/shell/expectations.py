@@ -1,4 +1,4 @@
-"""What a case expects beside what its run has computed."""
+"""Comparison of the values that a case expects with those that its run computed."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from workflow.shell.summary import required_number
 
 @dataclass(frozen=True)
 class Verdict:
-    """An expectation, met or missed.
+    """Result of comparing one expectation with the computed value.
 
     ``expected`` and ``computed`` are in the ``unit`` in which the case writes the value, "" for a
-    bare number. ``error`` is relative to the value; of a value 0 in its unit.
+    bare number. ``error`` is relative to the expected value, or absolute in that unit if it is 0.
     """
 
     entry: Expectation
@@ -35,7 +35,10 @@ class Verdict:
 
 
 def verdicts(case: Case, summary: Mapping[str, Any]) -> list[Verdict]:
-    """Of all that a case expects. Raises QuantityError for what the summary has no number of."""
+    """Compare every expectation of a case with the summary.
+
+    Raises QuantityError if the summary has no number for an expected quantity.
+    """
     return [_verdict(entry, summary) for entry in case.expect]
 
 

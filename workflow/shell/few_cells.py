@@ -1,4 +1,4 @@
-"""Contacts that lie on few cells of their grid: warned of, or refused where no field is left."""
+"""Check that a contact covers enough cells of its grid."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from sa_solver.types import Array, Grid
 from workflow.errors import UserError
 from workflow.shell.reporter import Reporter
 
-# A grid of a contact may have so many cells along a direction.
+# Largest number of cells of a contact grid along a direction.
 MOST_CELLS = 4096
-# Proposed grids give so much more cells than enough: those counted may reach beyond the contact.
+# A proposed grid has this factor more cells than needed, since the counted cells may reach beyond
+# the contact.
 MARGIN = 1.25
-# A grid that is made smaller has so many times more cells than the contact, for room around it.
+# A grid that is made smaller has this factor more cells than the contact, for room around it.
 ROOM = 1.25
 
 
@@ -29,11 +30,11 @@ def check_cells(
     fixed: bool = True,
     worn: bool = False,
 ) -> None:
-    """Warn of a ``pressure`` ``(nx, ny)`` on few cells, with a grid that would do.
+    """Warn if a ``pressure`` field ``(nx, ny)`` covers too few cells, and propose a finer grid.
 
-    ``settings`` is the section ``contact`` of a case, whose size stays if that is ``fixed``. Raises
-    UserError where the contact is a point on its grid, unless it is ``worn``: then all but the end
-    has been computed.
+    ``settings`` is the section ``contact`` of a case, whose size stays the same if it is ``fixed``.
+    Raises UserError if the contact is a single point on its grid. If the contact is ``worn``, the
+    run is almost finished by then, so a warning is given instead.
     """
     pressed, enough = pressure > 0.0, fewest_across(grid.line)
     across = cells_across(pressed)[: 1 if grid.line else 2]
@@ -64,6 +65,6 @@ def check_cells(
 
 
 def _entry(values: Sequence[object], like: object) -> str:
-    """Values as the case has them: one, or a list."""
+    """Format values as the case writes them: a single value or a list."""
     listed = ", ".join(map(str, values))
     return f"[{listed}]" if isinstance(like, tuple) else listed

@@ -1,9 +1,9 @@
-"""A command's output folder: whose it is, what was written there, and what may be overwritten.
+"""Output folder of a command: its owner, its contents, and what may be overwritten.
 
-A run asks the folder by name for every entry that it makes, and says what it is. Its manifest has
-them before they are made, but for the files in the folders that it fills, which are listed
-afterwards. A later run removes what the manifest names and nothing else, through no link; what is
-in its way is set aside.
+A run requests every entry of the folder by name and describes it. The manifest lists each entry
+before it is made; only the files in subfolders that the run fills are listed afterwards. A later
+run removes what the manifest names and nothing else, and never follows a link. Other files that
+are in the way are renamed.
 """
 
 from __future__ import annotations
@@ -33,25 +33,25 @@ from workflow.shell.store import (
 
 MANIFEST = "manifest.json"
 REPORT = "report.html"
-# Key of the manifest below which it lists what is ours: other programs have such files too.
+# Key of the manifest below which it lists our files: other programs write such manifests too.
 OURS = "fretscale"
-# What says how far a run is: left by somebody else, it would be taken for that of a run.
+# Entries that show the progress of a run; foreign files with these names would be mistaken for it.
 TELLING = ("summary.json", "checkpoint.h5", "jumps")
-# Ending of what was there before under a name that a run asks for.
+# Ending that is added to a foreign file whose name a run needs.
 ASIDE = ".aside"
 # Record of the settings that were chosen for a case, so that a resumed run knows it.
 CHOICE = "choice.json"
-# Entry of the summary by which a finished run is known to be as it was left; not of what is written
-# to later, or by what a run knows itself.
+# Entry of the summary with digests, by which changes to a finished run are detected. It excludes
+# files that are written later and files that the digests are stored in or checked against.
 DIGESTS = "digests"
 NOT_DIGESTED = ("case.yaml", "summary.json", "checkpoint.h5", "run.log", REPORT)
-# What a run keeps of itself until it ends; too many to be listed one by one.
+# Folder of intermediate files that a run removes at its end; too many to be listed one by one.
 STATE = "jumps"
 STATE_FILE = re.compile(rf"\d+\.h5|{re.escape(CHOICE)}")
 
 
 class OutputFolder:
-    """Paths of a run's files; other commands, of another ``kind``, have entries of their own."""
+    """Paths of the files of a run; commands of another ``kind`` have a separate list of entries."""
 
     def __init__(self, root: Path, kind: str = "run") -> None:
         self.root = root
@@ -64,20 +64,20 @@ class OutputFolder:
         self.jumps = root / STATE
 
     def jump(self, number: int) -> Path:
-        """File of one jump's fields."""
+        """Return the path of one file of steps."""
         return self.jumps / f"{number:05d}.h5"
 
     # --- what the run writes --------------------------------------------------------------------
 
     @property
     def manifest(self) -> dict[str, str] | None:
-        """What the run wrote, or was about to write, by name; None where nothing tells."""
+        """Descriptions of the entries of the run by name; None if there is no manifest."""
         listed = self._manifests.get(self._kind)
         return None if listed is None else {n: w for n, w in listed.items() if _is_entry(n)}
 
     @property
     def _manifests(self) -> dict[str, dict[str, str]]:
-        """The same of all kinds."""
+        """Manifests of all kinds of command in this folder."""
         try:
             ours = json.loads(read_bytes(self.root / MANIFEST))[OURS]
             return {kind: {name: str(ours[kind][name]) for name in ours[kind]} for kind in ours}
@@ -97,9 +97,9 @@ class OutputFolder:
             path.rename(_free(path.with_name(path.name + ASIDE)))
 
     def reserve(self, name: str, what: str) -> Path:
-        """The path of a file or folder that the run is to make here; ``what`` says what it is.
+        """Return the path of a file or folder that the run will make, described by ``what``.
 
-        Something there that is not of the run is set aside under a name of its own.
+        An entry of that name that does not belong to the run is renamed.
         """
         listed = self.manifest or {}
         if name not in listed:
@@ -108,7 +108,7 @@ class OutputFolder:
         return self.root / name
 
     def replace(self, entries: Mapping[str, str], force: bool) -> list[Path]:
-        """The paths of several. Raises UserError where one is there, unless ``force``."""
+        """Return the paths of several entries. Raises UserError if one exists, unless ``force``."""
         there = [path for name in entries if os.path.lexists(path := self.root / name)]
         if there and not force:
             raise UserError(f"{there[0]}: exists; give another folder, or --force")
@@ -116,9 +116,9 @@ class OutputFolder:
 
     @contextmanager
     def filling(self, name: str, what: str) -> Iterator[Path]:
-        """A folder of the run; the files that are written there meanwhile are listed.
+        """Yield a folder of the run, and list the files written there in the manifest.
 
-        One that stays empty is removed.
+        The folder is removed if it stays empty.
         """
         folder = self.reserve(name, what)
         folder.mkdir(exist_ok=True)
@@ -132,24 +132,25 @@ class OutputFolder:
                 self.discard(name)
 
     def _files(self, folder: Path) -> set[tuple[str, int]]:
-        """Names of the files below a folder, with the moment when each was written."""
+        """Return the names of the files below a folder, each with its modification time."""
         files = [path for path in folder.rglob("*") if path.is_file()]
         return {(f.relative_to(self.root).as_posix(), f.stat().st_mtime_ns) for f in files}
 
     def discard(self, name: str) -> None:
-        """Remove what the run has no more use for."""
+        """Remove an entry that the run no longer needs."""
         self._remove(name)
         self._list({n: what for n, what in (self.manifest or {}).items() if n != name})
 
     def reserve_state(self) -> None:
-        """Make room for what a run needs to go on where it was cut off."""
+        """Reserve the entries that the run needs in order to resume."""
         self.reserve("checkpoint.h5", "how far the run has come, for it to go on from")
         self.reserve(STATE, "what the run has found so far, until it ends").mkdir(exist_ok=True)
 
     def discard_state(self) -> None:
-        """Remove what the run has found on the way, and the name of a state that it never kept.
+        """Remove the intermediate files, and the entry of a checkpoint that was never written.
 
-        The name of what it has found goes last: it tells that this was cut off.
+        The manifest entry of the intermediate files is removed last: while it exists, the removal
+        is known to be incomplete.
         """
         listed = self.manifest or {}
         if self.checkpoint.name in listed and not self.checkpoint.exists():
@@ -159,26 +160,26 @@ class OutputFolder:
 
     @property
     def has_leftovers(self) -> bool:
-        """Whether a finished run was cut off before it had removed all that it removes."""
+        """Whether a finished run was interrupted before it had removed all its temporary files."""
         lock = os.path.lexists(self.root / LOCK)
         return lock or STATE in (self.manifest or {}) or any(True for _ in self._partial())
 
     def clear_leftovers(self) -> None:
-        """Remove what a finished run had no time to remove, but for its lock."""
+        """Remove the temporary files that a finished run did not remove, except for its lock."""
         self.clear_partial()
         self.discard_state()
 
     @property
     def lists_state(self) -> bool:
-        """Whether the manifest names what a run needs to go on, which no other run may have."""
+        """Whether the manifest names the entries needed to resume; only resumable runs have any."""
         return {self.checkpoint.name, self.jumps.name} <= (self.manifest or {}).keys()
 
     def reserve_log(self) -> Path:
-        """The path of what the run says."""
+        """Return the path of the log."""
         return self.reserve("run.log", "what the run said, and when")
 
     def reserve_report(self) -> Path:
-        """The path of the page that tells all of the run."""
+        """Return the path of the report."""
         return self.reserve(REPORT, "all of the run on one page, for people")
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
@@ -186,9 +187,10 @@ class OutputFolder:
         write_json(self.reserve("summary.json", "what came out, in numbers"), summary)
 
     def finish(self, summary: Mapping[str, Any], provenance: Mapping[str, Any]) -> None:
-        """Write the summary of a run with digests of what belongs to it.
+        """Write the summary of a run with digests of everything that belongs to it.
 
-        These are the values of the case, the files that it names, what the run wrote, the summary.
+        The digests cover the values of the case, the input files, the files that the run wrote and
+        the summary.
         """
         names = (self.manifest or {}).keys() - set(NOT_DIGESTED)
         paths = [path for path in sorted(self.root.iterdir()) if path.name in names]
@@ -199,7 +201,7 @@ class OutputFolder:
         self.write_summary(content | {DIGESTS: digests | {"summary.json": json_digest(content)}})
 
     def read_summary(self) -> dict[str, Any]:
-        """The summary of a finished run. Raises UserError unless it is as it was written."""
+        """Return the summary of a finished run. Raises UserError if it has changed since."""
         try:
             summary = json.loads(read_bytes(self.summary))
             kept = summary[DIGESTS].pop("summary.json")
@@ -210,12 +212,12 @@ class OutputFolder:
         return summary
 
     def check_run(self) -> None:
-        """Raise UserError where there is no run."""
+        """Raise UserError if the folder contains no run."""
         if not self.case.exists():
             raise UserError(f"{self.root}: no run of fretscale here (case.yaml is missing)")
 
     def check_ended(self) -> None:
-        """Raise UserError where there is no run, or one that is not finished."""
+        """Raise UserError if the folder contains no run or an unfinished one."""
         self.check_run()
         if not self.summary.exists():
             how = f"start it again with `{self.run_command}`"
@@ -224,12 +226,12 @@ class OutputFolder:
             raise UserError(f"{self.root}: this run is not finished; {how}")
 
     def check_finished(self, case: Mapping[str, Any]) -> None:
-        """Raise UserError unless a finished run is as it was left, and of the values of a case."""
+        """Raise UserError if a file of the finished run or the values of its case have changed."""
         for name, kept in self.read_summary()[DIGESTS].items():
             self._check(name, kept, case)
 
     def check_results(self, case: Mapping[str, Any]) -> None:
-        """The same of its case and results; of its input files only their paths may be left."""
+        """Raise UserError if the case or the results have changed; input files may be missing."""
         digests = self.read_summary()[DIGESTS]
         for path in (self.case, self.results):
             self._check(path.name, digests.get(path.name), case)
@@ -241,43 +243,43 @@ class OutputFolder:
 
     @property
     def run_command(self) -> str:
-        """What runs its case anew here, for a shell."""
+        """Shell command that runs the case of this folder again."""
         return f"fretscale run {quote(str(self.case))} --out {quote(str(self.root))}"
 
     @property
     def resume_command(self) -> str:
-        """What goes on with the run here, for a shell."""
+        """Shell command that resumes the run in this folder."""
         return f"fretscale resume {quote(str(self.root))}"
 
     @property
     def again(self) -> str:
-        """What to do where a run cannot be believed."""
+        """Advice for a run whose files cannot be trusted."""
         return f"start again with `{self.run_command} --force`"
 
     def keep_choice(self, record: Mapping[str, Any] | None) -> None:
-        """Keep what was chosen for the case with the run until it is finished."""
+        """Store the settings chosen for the case until the run is finished."""
         if record is not None:
             write_json(self.jumps / CHOICE, record)
 
     @property
     def choice(self) -> dict[str, Any] | None:
-        """What was chosen for the case, of a run that is not finished yet; None for nothing."""
+        """Settings chosen for the case of an unfinished run; None if none were chosen."""
         path = self.jumps / CHOICE
         try:
             return json.loads(read_bytes(path)) if path.exists() else None
         except ValueError as error:
             raise UserError(f"{path}: damaged; {self.again}") from error
 
-    # --- whose it is ----------------------------------------------------------------------------
+    # --- owner ----------------------------------------------------------------------------------
 
     def claim(self, case: Case, force: bool, resumable: bool) -> list[str]:
-        """Make the folder this run's own, removing what an earlier run left.
+        """Take the folder for this run, and remove the files of an earlier run.
 
-        Of an unfinished run of this case the runs of their own that it had made first stay. A run
-        that is ``resumable`` keeps in ``jumps`` what it needs until it is finished. Returns the
-        names of what stays where nothing tells whose it is.
-        Raises :class:`UserError` if it holds anything of another case, an unfinished run, or what
-        nothing tells whose it is, and ``force`` is not given; nothing of that is removed.
+        If the earlier run is an unfinished run of the same case, the sub-runs that it made are not
+        removed. A ``resumable`` run stores what it needs to resume in ``jumps`` until it is
+        finished. Returns the names of the entries that remain although their owner is unknown.
+        Raises :class:`UserError`, and removes nothing, if the folder holds anything of another
+        case, an unfinished run, or entries of an unknown owner, and ``force`` is not given.
         """
         if not force:
             self._refuse_other(case)
@@ -294,19 +296,19 @@ class OutputFolder:
         return stays if listed is None else []
 
     def clear_partial(self) -> None:
-        """Remove what a run that was killed had begun to write."""
+        """Remove the partly written files of a run that was killed."""
         for path in list(self._partial()):
             path.unlink()
 
     def _partial(self) -> Iterator[Path]:
-        """The files that it had begun to write."""
+        """Yield the partly written files of the run."""
         listed = [self.root / name for name in self.manifest or {} if not self._is_run(name)]
         walks = map(os.walk, [path for path in listed if not path.is_symlink()])
         for folder in [self.root, *(Path(place) for place, _, _ in chain.from_iterable(walks))]:
             yield from (p for p in folder.glob(".*") if PARTIAL_NAME.fullmatch(p.name))
 
     def _clear(self, keep_runs: bool) -> None:
-        """Remove what an earlier run wrote, but for runs of their own; list what of it stays."""
+        """Remove the files of an earlier run, optionally except its sub-runs; list what remains."""
         self.clear_partial()
         listed = self.manifest or {}
         kept = {name: what for name, what in listed.items() if keep_runs and self._is_run(name)}
@@ -316,7 +318,7 @@ class OutputFolder:
         self._list(kept)
 
     def _remove(self, name: str) -> None:
-        """Remove a file of the run, or a folder that has nothing else; nothing through a link."""
+        """Remove a file of the run, or a folder if it is then empty; never follow a link."""
         path, above = self.root / name, [self.root / part for part in PurePath(name).parents][:-1]
         if any(folder.is_symlink() for folder in above):
             return
@@ -335,11 +337,11 @@ class OutputFolder:
                 folder.rmdir()
 
     def _is_run(self, name: str) -> bool:
-        """Whether it is a run of its own."""
+        """Return whether the entry is a run with a manifest."""
         return OutputFolder(self.root / name).manifest is not None
 
     def refuse_foreign(self, remedy: str = "") -> None:
-        """Leave alone what nothing of ours has made. Raises UserError."""
+        """Raise UserError if the folder holds entries of an unknown owner."""
         if self.manifest is None and self._entries():
             what = f"not empty and no {self._kind} of fretscale; give another folder{remedy}"
             raise UserError(f"{self.root}: {what}")
@@ -357,7 +359,7 @@ class OutputFolder:
             )
 
     def _entries(self) -> list[str]:
-        """Names of what is there, but for what any command of ours leaves, killed early even."""
+        """Return the names of all entries except those that a killed command of ours may leave."""
         if not self.root.exists():
             return []
         ours = {LOCK} if self.manifest is None else {LOCK, MANIFEST}
@@ -365,18 +367,18 @@ class OutputFolder:
         return [name for name in names if name not in ours and not PARTIAL_NAME.fullmatch(name)]
 
     def _holds(self, case: Case) -> bool:
-        """Whether the folder was claimed for this case."""
+        """Return whether the folder was claimed for this case."""
         return self.case.exists() and read_bytes(self.case) == dump_case(case).encode("utf-8")
 
 
 def _is_entry(name: str) -> bool:
-    """Whether it names something in a folder, and no more than a run makes there."""
+    """Return whether ``name`` is a visible relative path, as the entries of a run are."""
     path = PurePath(name)
     hidden = any(part.startswith(".") for part in path.parts)
     return bool(path.parts) and not hidden and not path.is_absolute() and str(path) == name
 
 
 def _free(path: Path) -> Path:
-    """The path, or the first with a number at its end that nothing has."""
+    """Return the path, or the first one with a number appended that does not exist."""
     numbered = (path.with_name(f"{path.name}{number}") for number in count(2))
     return next(free for free in chain([path], numbered) if not os.path.lexists(free))

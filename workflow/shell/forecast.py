@@ -1,4 +1,4 @@
-"""How long the rest of a run will take, told by how long its work so far has taken."""
+"""Forecast of the remaining time of a run from the time its work has taken so far."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import time
 from collections.abc import Callable
 
 MINUTE, HOUR, DAY = 60.0, 3600.0, 86400.0
-# Below a minute, what a time is told as, the nearest by its logarithm [s].
+# Rounded values for times below a minute; the nearest on a logarithmic scale is used [s].
 FEW, ROUND = "a few seconds", (5.0, 10.0, 20.0, 30.0, 40.0)
 
 
 class Forecast:
-    """The time that is left of work, by what its share that is done has taken.
+    """Remaining time of work, extrapolated from the share that is done.
 
-    As soon as there is more, the first step does not count: with it libraries are loaded and laws
-    compiled. Times are those of a ``clock`` [s].
+    The first step does not count once there is a second: during the first, libraries are loaded and
+    laws compiled. Times are those of a ``clock`` [s].
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -23,15 +23,15 @@ class Forecast:
         self.go_on()
 
     def go_on(self) -> None:
-        """What is done by now was kept from an earlier run: it says nothing about the rest."""
+        """Restart the measurement: the work done so far was restored from an earlier run."""
         self._begin = self._first = self._clock(), self.share
         self.steps = 0
 
     def reach(self, share: float) -> None:
-        """So large a share of all work is done; a smaller one than before where more has shown.
+        """Set the share of all work that is done; it may fall if more work has appeared.
 
-        Whoever reckons it may be wrong: below 0, or where it is no number, nothing is done yet, and
-        above 1 all is.
+        The caller's estimate may be wrong: a value below 0 or NaN counts as 0, a value above 1 as
+        1.
         """
         share = min(share, 1.0) if share > 0.0 else 0.0
         self._now, self.share = self._clock(), share
@@ -41,23 +41,23 @@ class Forecast:
 
     @property
     def measured(self) -> float:
-        """Time from which the rest is told [s]."""
+        """Measured time on which the forecast is based [s]."""
         return self._now - self._since[0]
 
     @property
     def left(self) -> float | None:
-        """Time to the end [s], None while nothing is done."""
+        """Time to the end [s]; None while nothing is done."""
         done = self.share - self._since[1]
         return self.measured * (1.0 - self.share) / done if done > 0.0 else None
 
     @property
     def _since(self) -> tuple[float, float]:
-        """Time and share from which on steps count."""
+        """Time and share at which the measurement starts."""
         return self._first if self.steps > 1 and self.share > self._first[1] else self._begin
 
 
 def in_words(seconds: float) -> str:
-    """A time as roughly as it is known: a few seconds, 20 s, 12 min, 3 h, 2 days."""
+    """Return a time rounded to its accuracy: a few seconds, 20 s, 12 min, 3 h, 2 days."""
     if seconds < ROUND[0]:
         return FEW
     if seconds < 0.8 * MINUTE:
@@ -69,11 +69,11 @@ def in_words(seconds: float) -> str:
 
 
 def about(seconds: float) -> str:
-    """The same as part of a sentence: about 12 min, but not about a few seconds."""
+    """Return the rounded time for use in a sentence: "about 12 min", but "a few seconds"."""
     told = in_words(seconds)
     return told if told == FEW else f"about {told}"
 
 
 def _round(number: float) -> str:
-    """Two digits, of small numbers one."""
+    """Round to two digits; numbers below 20 to an integer."""
     return f"{max(number, 1.0):.0f}" if number < 20.0 else f"{5.0 * round(number / 5.0):.0f}"

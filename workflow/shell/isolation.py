@@ -1,4 +1,4 @@
-"""What only tells of a run or shows it cannot end the run: a failure there becomes a warning."""
+"""Isolation of code that only reports or shows a run: a failure there becomes a warning."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from workflow.errors import UNWRITTEN, one_line
 
 
 class Isolation:
-    """Contexts out of which no failure gets: it is handed to ``warn``, once for each of them.
+    """Context managers that turn an exception into one call of ``warn`` for each named part.
 
-    They stand around progress, forecasts, the log, the terminal, figures and the report, on which
-    no result depends. Only where the system lets nothing more be written is the error raised again:
-    the run then stops as it does at any other file, and goes on once there is room.
+    They surround progress, forecasts, the log, the terminal, figures and the report, on which no
+    result depends. The error is raised again only if the system can write nothing more, for example
+    on a full disk: the run then stops as for any other file, and can be resumed once there is room.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:
@@ -22,9 +22,9 @@ class Isolation:
 
     @contextmanager
     def __call__(self, what: str, needed: bool = True) -> Iterator[None]:
-        """Isolate what ``what`` names to users; as a decorator, each call of a function.
+        """Isolate the part that ``what`` names to users; as a decorator, isolate each call.
 
-        What is not ``needed`` is done without even where nothing more can be written.
+        A part that is not ``needed`` is skipped even if nothing more can be written.
         """
         try:
             yield

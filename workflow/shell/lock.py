@@ -1,9 +1,9 @@
-"""One process at a time in a folder: a lock that says who holds it.
+"""Lock that allows one process at a time in a folder and names its holder.
 
-The system gives a lock back when its process ends, however that ends; so what a process that was
-killed leaves is told from one that works, and nobody goes by a number that another process may have
-by now. Where the holder was on another machine, the file system may not have carried the lock over:
-only whoever knows that machine can say that the process has gone.
+The system releases the lock when its process ends, in whatever way. So the lock file of a killed
+process can be distinguished from that of a running one without the process number, which another
+process may have by then. If the holder ran on another machine, the file system may not have
+transferred the lock: then only the user can know whether the process has ended.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ if sys.platform != "win32":
     import fcntl
 
 LOCK = ".fretscale.lock"
-# Seconds between two looks at a lock that another process has.
+# Seconds between two checks of a lock that another process holds.
 LOOK = 0.2
-# How often another process may remove a folder just as this one makes it. Some file systems, as
-# /proc, say each time that what is to be made is not there.
+# How often another process may remove a folder just as this one makes it. Some file systems, such
+# as /proc, report every time that the folder to be made does not exist.
 MOST_REMOVED = 1000
-# A link is not followed: what it leads to is not ours.
+# A link is not followed: its target does not belong to us.
 FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
 
 
 @contextmanager
 def locked(root: Path, patience: float = 0.0, take_over: bool = False) -> Iterator[str]:
-    """Hold a folder, made if there is none; yields what to tell of a process that left its lock.
+    """Hold a folder, made if necessary; yield a message about a process that left its lock, or "".
 
-    Waits so many seconds for a process that works there. Whoever is to ``take_over`` knows that
-    processes of other machines have gone. Raises UserError where the folder stays in use.
+    Waits up to ``patience`` seconds for a process that works there. With ``take_over``, the caller
+    states that processes of other machines have ended. Raises UserError if the folder stays in use.
     """
     fresh = not _is_folder(root)
     path = root / LOCK
@@ -65,8 +65,8 @@ def locked(root: Path, patience: float = 0.0, take_over: bool = False) -> Iterat
 
 
 def _is_folder(root: Path) -> bool:
-    """False where nothing is; raises UserError for what is no folder."""
-    # Looked at once: another process may remove it meanwhile.
+    """Return whether the folder exists. Raises UserError if it is a file."""
+    # A single system call, because another process may remove the folder between two of them.
     try:
         mode = root.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -77,10 +77,10 @@ def _is_folder(root: Path) -> bool:
 
 
 def _opened(path: Path, patience: float) -> tuple[int, bool]:
-    """The lock file, open, and whether the system says that no other process has it."""
+    """Return the open lock file, and whether the system confirms that no other process holds it."""
     end, removed = time.monotonic() + patience, 0
     while True:
-        # Its last holder may remove the folder, left empty, between any two of these steps.
+        # The last holder may remove the empty folder between any two of these steps.
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             check_regular(path)
@@ -105,7 +105,7 @@ def _opened(path: Path, patience: float) -> tuple[int, bool]:
             continue
         except OSError:  # a file system without locks
             return file, False
-        # Its last holder may have removed it meanwhile: then another one may be there by now.
+        # The last holder may have removed the file meanwhile, and another one may exist by now.
         with suppress(OSError):
             if sys.platform == "win32" or os.path.samestat(os.fstat(file), path.stat()):
                 return file, sys.platform != "win32"
@@ -113,7 +113,7 @@ def _opened(path: Path, patience: float) -> tuple[int, bool]:
 
 
 def _read(file: int) -> dict[str, object]:
-    """What the holder wrote; nothing where it has not come to that."""
+    """Return what the holder wrote; empty if it has not written anything yet."""
     try:
         os.lseek(file, 0, os.SEEK_SET)
         told = json.loads(os.read(file, 4096))

@@ -1,11 +1,12 @@
-"""Points that were measured beside the curves of a run.
+"""Comparison of measured points with the computed curves of a run.
 
-Between two points of a computed curve a straight line is taken. Its error is estimated by lines
-through every second point, first those of even and then those of odd number: with differences a and
-b to the line through all, it is a b / (a + b), which is exact for even distances and curvature. At
-the ends, where only one of the two is another line, it is at most that difference. Where a curve
-comes to a place several times, as a loop does, the branch that is nearest to the point is meant,
-which flatters the computation; it is told. Nothing is extrapolated.
+Computed curves are interpolated linearly. The interpolation error is estimated from lines through
+every second point, once the even and once the odd ones: if these differ by a and b from the line
+through all points, the error is a b / (a + b), which is exact for equal spacing and curvature. In
+the first and last intervals only one of the two lines differs, and the larger difference is an
+upper bound. Where a curve takes several values at a place, as a loop does, the value nearest to
+the measured one is used, which favours the computation; the summary reports it. Nothing is
+extrapolated.
 """
 
 from __future__ import annotations
@@ -29,33 +30,34 @@ from workflow.shell.curves import Curve, curves_in
 from workflow.shell.dataset import unit_in
 from workflow.shell.quantities import CurvesOf
 
-# Ending of the heading of standard deviations, as in `fretscale fit`.
+# Ending of the heading of a column of standard deviations, as in `fretscale fit`.
 OF_DEVIATIONS = "_deviation"
-# Beyond an end of a curve by so much of its length, a point is at the end: conversion rounds.
+# A point this far beyond an end of a curve, relative to the curve's extent, counts as at the end,
+# because unit conversion rounds.
 AT_END = 1e-9
 
 
 @dataclass(frozen=True)
 class Points:
-    """What was measured, ``(n,)`` each, in base units; ``deviations`` are None if not known."""
+    """Measured points, arrays ``(n,)`` in base units; ``deviations`` are None if not known."""
 
     x: Array
     y: Array
     deviations: Array | None
 
     def only(self, chosen: Mask) -> Points:
-        """Those of a mask ``(n,)``."""
+        """Return the points selected by a mask ``(n,)``."""
         deviations = None if self.deviations is None else self.deviations[chosen]
         return Points(self.x[chosen], self.y[chosen], deviations)
 
 
 @dataclass(frozen=True)
 class Beside:
-    """Points beside the curve that they are of.
+    """Measured points together with the computed curve that they are compared with.
 
-    ``computed`` ``(n,)`` is NaN outside the curve, ``several`` whether it comes to one of them more
-    than once. ``error`` is the largest estimate of what interpolation leaves, None of a curve
-    of two points, where nothing tells it.
+    ``computed`` ``(n,)`` is NaN outside the curve. ``several`` is true if the curve takes several
+    values at one of the points. ``error`` is the largest estimated interpolation error; it is None
+    for a curve of two points, from which the error cannot be estimated.
     """
 
     entry: Measured
@@ -67,14 +69,14 @@ class Beside:
 
     @property
     def inside(self) -> Mask:
-        """Which of the points ``(n,)`` are in the computed range."""
+        """Mask ``(n,)`` of the points that are in the computed range."""
         return np.isfinite(self.computed)
 
 
 def check_measured(case: Case, curves: Sequence[CurvesOf]) -> None:
-    """Raise UserError for what no run could be compared with, before it is begun.
+    """Raise UserError, before the run begins, for points that no run could be compared with.
 
-    What needs the results to be known, as which of its curves are there, is left to :func:`beside`.
+    Checks that need the results, such as which of the curves exist, are left to :func:`beside`.
     """
     for number, entry in enumerate(case.measured):
         meant = [wanted for wanted in curves if _begins(entry.curve, wanted.title)]
@@ -89,14 +91,14 @@ def check_measured(case: Case, curves: Sequence[CurvesOf]) -> None:
 
 
 def _units_of(curves: CurvesOf) -> Iterator[tuple[str, str]]:
-    """Those that curves may have: in contacts over an area, and in line contacts."""
+    """Yield the units of the curves for contacts over an area and for line contacts."""
     for line in (False, True):
         x, y = (unit_in(line, unit) for unit in curves.units)
         yield x, y
 
 
 def _refusal(entry: Measured, x_unit: str, y_unit: str) -> str:
-    """Why its points are none in these units, of which "" is any; empty if they are."""
+    """Return why the points cannot be read in these units ("" for any unit); empty if they can."""
     try:
         read_points(entry, x_unit, y_unit)
     except UserError as error:
@@ -105,7 +107,7 @@ def _refusal(entry: Measured, x_unit: str, y_unit: str) -> str:
 
 
 def beside(entry: Measured, file: h5py.File, curves: Sequence[CurvesOf]) -> Beside:
-    """The points of an entry beside the curve in a ``results.h5``. Raises UserError."""
+    """Compare the points of an entry with its curve in a ``results.h5``. Raises UserError."""
     found = [curve for wanted in curves for curve in curves_in(file, wanted)]
     titles = [curve.title for curve in found]
     named = [c for c in found if c.title == entry.curve] or [
@@ -121,7 +123,7 @@ def beside(entry: Measured, file: h5py.File, curves: Sequence[CurvesOf]) -> Besi
 
 
 def compared(entry: Measured, curve: Curve, points: Points) -> Beside:
-    """Points beside a curve, each with what is computed there."""
+    """Compare points with a curve, interpolated at each of them."""
     crossings = [_crossings(curve.x, curve.y, x) for x in points.x]
     computed = np.array([_nearest(c, y) for c, y in zip(crossings, points.y, strict=True)])
     error = _interpolation_error(curve, points.x, computed)
@@ -153,9 +155,10 @@ def _between(x: Array, ends: Array) -> Mask:
 
 
 def read_points(entry: Measured, x_unit: str, y_unit: str) -> Points:
-    """The points of an entry in base units. Raises InputFileError, with file and line or key.
+    """Return the points of an entry in base units.
 
-    Where a base unit is "", numbers are only read, in the unit that they have.
+    If a base unit is "", numbers are only read, in their given unit. Raises InputFileError with
+    file and line, or key.
     """
     if entry.file is None:
         x = _listed("at", entry.at, x_unit)
@@ -178,10 +181,10 @@ def read_points(entry: Measured, x_unit: str, y_unit: str) -> Points:
 
 
 def told(found: Beside) -> dict[str, Any]:
-    """What the summary says of it: computed minus measured, in base units.
+    """Return the comparison for the summary: computed minus measured, in base units.
 
-    Relative deviations are those of all points over the mean and the rms of what was measured, as
-    single values may be 0. Nothing is fitted here: chi² is per point.
+    Relative deviations are relative to the mean and the rms of all measured values, since single
+    values may be 0. Nothing is fitted here, so chi² is divided by the number of points.
     """
     inside, points = found.inside, found.points
     off = (found.computed - points.y)[inside]
@@ -217,7 +220,7 @@ def told(found: Beside) -> dict[str, Any]:
 
 
 def tell_measured(case: Case, curves: Sequence[CurvesOf], results: Path) -> list[dict[str, Any]]:
-    """What the summary says of all that was measured; ``refused`` says why one cannot be."""
+    """Return the comparisons for the summary; ``refused`` says why one is impossible."""
     if not case.measured:
         return []
     content: list[dict[str, Any]] = []
@@ -232,7 +235,7 @@ def tell_measured(case: Case, curves: Sequence[CurvesOf], results: Path) -> list
 
 
 def doubts_of_measured(content: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """A warning for each that is not compared, and for points that nothing is computed for."""
+    """Yield a warning for each failed comparison and for points outside the computed range."""
     for number, one in enumerate(content):
         if "refused" in one:
             yield f"measured.{number}: not compared: {one['refused']}"
@@ -242,7 +245,7 @@ def doubts_of_measured(content: Sequence[dict[str, Any]]) -> Iterator[str]:
 
 
 def lines_of_measured(content: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """The same in short, a line for each."""
+    """Yield a one-line text for each comparison."""
     for one in content:
         if "rms_deviation" not in one:
             continue
@@ -269,7 +272,7 @@ def _over(value: float, size: float) -> float | None:
 
 
 def _crossings(x: Array, y: Array, place: float) -> Array:
-    """What a polyline ``(n,)`` has at a place ``(m,)``: nothing outside, several of a loop."""
+    """Return the values ``(m,)`` of a polyline ``(n,)`` at a place, several if it is a loop."""
     known = np.isfinite(x) & np.isfinite(y)
     if not known.any():
         return np.empty(0)
@@ -290,7 +293,7 @@ def _within(x: Array, place: float, near: float) -> bool:
 
 
 def _nearest(candidates: Array, value: float) -> float:
-    """NaN where there is none."""
+    """Return the candidate nearest to ``value``, or NaN without candidates."""
     if not candidates.size or not np.isfinite(value):
         return float("nan")
     return float(candidates[np.argmin(np.abs(candidates - value))])
@@ -309,13 +312,13 @@ def _table(entry: Measured, file: str) -> TableFile:
 
 
 def _called(entry: Measured) -> tuple[str, str, str]:
-    """Headings of places, values and standard deviations."""
+    """Return the headings of places, values and standard deviations."""
     values = entry.columns.values or "values"
     return entry.columns.at or "at", values, f"{values}{OF_DEVIATIONS}"
 
 
 def _headings(entry: Measured, table: TableFile) -> list[str]:
-    """Those of them that a table has."""
+    """Return those of these headings that a table contains."""
     return [name for name in _called(entry) if name in table.names]
 
 
@@ -334,7 +337,7 @@ def _with_unit(table: TableFile, name: str, base: str) -> Array:
 
 
 def _listed(key: str, numbers: Sequence[float], base: str) -> Array:
-    """Numbers of the case, which must have been written in units of this dimension."""
+    """Return numbers of the case, which must have been written in units of this dimension."""
     for number in numbers if base else ():
         _, unit = in_unit_of(number, number)
         if unit or base != "1":

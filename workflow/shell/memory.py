@@ -1,4 +1,4 @@
-"""Memory a run needs, held against what there is before anything large is allocated."""
+"""Memory estimate of a run, compared with the free memory before anything large is allocated."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ from fe_models.solvers.memory import available_bytes as _available_bytes
 from workflow.errors import OutOfMemory
 
 BYTES = 8
-"""Of a number."""
+"""Size of a number in bytes."""
 
-# Meshes, plots and the interpreter with its libraries.
+# Bytes for meshes, plots and the interpreter with its libraries.
 REST = 1.2e9
-# Sparse factors of a structure with this many nodes took this much; they grow with this power.
+# Measured bytes of the sparse factors of a structure with FACTOR_NODES nodes, and their growth
+# exponent.
 FACTOR_BYTES, FACTOR_NODES, FACTOR_POWER = 3.5e9, 1e5, 1.4
 
 
 @dataclass(frozen=True)
 class Memory:
-    """Upper estimate of the ``numbers`` that a run keeps, and of other ``bytes``.
+    """Upper estimate of the ``numbers`` that a run stores, and of other ``bytes``.
 
-    ``remedy`` is what makes such a case smaller.
+    ``remedy`` says how such a case can be made smaller.
     """
 
     numbers: float
@@ -29,11 +30,11 @@ class Memory:
 
     @property
     def required(self) -> float:
-        """Bytes of all."""
+        """Total memory [bytes]."""
         return BYTES * self.numbers + self.bytes + REST
 
     def check(self) -> None:
-        """Raise :class:`OutOfMemory` if the machine has less."""
+        """Raise :class:`OutOfMemory` if the machine has less free memory."""
         required, available = self.required, _available_bytes()
         if required > available:
             raise OutOfMemory(
@@ -43,5 +44,5 @@ class Memory:
 
 
 def factor_bytes(nodes: int) -> float:
-    """Of the sparse factors of a structure with so many nodes."""
+    """Return the memory of the sparse factors of a structure with this number of nodes [bytes]."""
     return float(FACTOR_BYTES * (nodes / FACTOR_NODES) ** FACTOR_POWER)

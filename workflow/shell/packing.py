@@ -1,7 +1,8 @@
-"""What a step of a run gives, as bytes: numbers, arrays and dataclasses of ours, and nothing else.
+"""Serialisation of the results of the steps of a run to bytes.
 
-Arrays keep their order in memory, since sums and products may round by it. Nothing that a file
-names is called but the dataclasses of our own packages, by their entries.
+Numbers, arrays and the dataclasses of our packages can be packed, and nothing else. Arrays keep
+their memory order, since the rounding of sums and products may depend on it. Nothing that a file
+names is called, except that the dataclasses of our packages are created from their entries.
 """
 
 from __future__ import annotations
@@ -17,23 +18,23 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Chebyshev
 
-# Where the dataclasses and named tuples are defined that may be packed.
+# Packages whose dataclasses and named tuples may be packed.
 PACKAGES = ("sa_solver", "wear", "fe_models", "workflow")
-# What stands for itself; other values are tuples that begin with what they are.
+# Types stored as they are; every other value becomes a tuple that begins with its kind.
 SIMPLE = frozenset((float, int, str, bool, bytes, type(None)))
 TUPLE, LIST, DICT, ARRAY, SCALAR, OBJECT, NAMED, POLYNOMIAL = range(8)
-# What bytes that were packed by another version lead to.
+# Exceptions that bytes packed by another version may cause.
 WRONG = (ValueError, TypeError, LookupError, AttributeError, ImportError, pickle.UnpicklingError)
 
 
 class PackingError(ValueError):
-    """Bytes that are not what this version packs."""
+    """Error for bytes that this version did not pack."""
 
 
 def packed(value: Any) -> tuple[bytes, bool]:
-    """The bytes of a value, and whether what is read from them is the same in memory too.
+    """Return the bytes of a value, and whether reading them restores the same memory layout.
 
-    Raises TypeError for what cannot be packed.
+    Raises TypeError for a value that cannot be packed.
     """
     strided: list[Any] = []
     data = pickle.dumps(_plain(value, strided), protocol=pickle.HIGHEST_PROTOCOL)
@@ -41,7 +42,7 @@ def packed(value: Any) -> tuple[bytes, bool]:
 
 
 def unpacked(data: bytes) -> Any:
-    """The value that was packed. Raises PackingError."""
+    """Return the value that was packed. Raises PackingError."""
     try:
         return _restored(_Plain(io.BytesIO(data)).load())
     except WRONG as error:
@@ -49,7 +50,7 @@ def unpacked(data: bytes) -> Any:
 
 
 class _Plain(pickle.Unpickler):
-    """Reads what Python has built in."""
+    """Unpickler that accepts only built-in types."""
 
     def find_class(self, module: str, name: str) -> Any:
         raise pickle.UnpicklingError(f"{module}.{name} is not read")
@@ -57,13 +58,13 @@ class _Plain(pickle.Unpickler):
 
 @cache
 def _entries_of(kind: Any) -> tuple[str, ...] | None:
-    """The names of a dataclass's entries, None of what is none."""
+    """Return the names of the entries of a dataclass, or None for other types."""
     return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else None
 
 
 @cache
 def _described(kind: Any) -> str:
-    """Where a dataclass or named tuple is defined, and with which entries."""
+    """Return where a dataclass or named tuple is defined, and its entries."""
     if kind.__module__.partition(".")[0] not in PACKAGES:
         raise TypeError(f"{kind.__module__}.{kind.__qualname__} cannot be packed")
     names = _entries_of(kind) or kind._fields
@@ -72,7 +73,7 @@ def _described(kind: Any) -> str:
 
 @cache
 def _kind(described: str) -> Any:
-    """The dataclass or named tuple that is described so. Raises ValueError."""
+    """Return the dataclass or named tuple with this description. Raises ValueError."""
     module, name, _ = described.split(":")
     kind = getattr(import_module(module), name) if module.partition(".")[0] in PACKAGES else None
     ours = isinstance(kind, type) and (is_dataclass(kind) or hasattr(kind, "_fields"))
@@ -82,7 +83,7 @@ def _kind(described: str) -> Any:
 
 
 def _plain(value: Any, strided: list[Any]) -> Any:
-    """A value in terms of what Python has built in; arrays of another stride are noted."""
+    """Return a value as built-in types; arrays with other strides are appended to ``strided``."""
     kind: Any = type(value)
     if kind in SIMPLE:
         return value
@@ -120,7 +121,7 @@ def _plain_others(kind: Any, value: Any, strided: list[Any]) -> Any:
 
 
 def _restored(plain: Any) -> Any:
-    """The inverse of :func:`_plain`."""
+    """Return the value that :func:`_plain` converted."""
     return plain if type(plain) in SIMPLE else RESTORED[plain[0]](*plain[1:])
 
 

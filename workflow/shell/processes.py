@@ -1,8 +1,8 @@
-"""Processes beside the main one: workers that answer calls, and jobs side by side.
+"""Processes that work together with the main one: workers that answer calls, and background jobs.
 
-A process of ours ends with its parent, however the parent ends, and leaves Ctrl-C to it. It is a
-fresh Python that is told over its stdin what to do and answers on its stdout: multiprocessing would
-run the parent's ``__main__`` again, which may have no guard, or be a notebook.
+Each process ends with its parent, however the parent ends, and leaves Ctrl-C to it. Each is a
+fresh Python that receives messages on stdin and answers on stdout. The multiprocessing module would
+instead run the parent's ``__main__`` again, which may have no guard, or be a notebook.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from typing import IO, Any
 from fe_models.interpreter import fresh_python
 from workflow.errors import MethodFailed
 
-# The workers share the cores among themselves; threads inside each would fight over them.
+# The workers share the cores among themselves; threads inside each would compete for them.
 THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 COMMAND = "from workflow.shell.processes import main; main()"
-# Bytes that say how long a message is.
+# Number of bytes that hold the length of a message.
 LENGTH = 8
 
 
@@ -35,18 +35,18 @@ Task = tuple[Callable[..., Any], tuple[Any, ...]]
 """A function that can be pickled, and its arguments."""
 
 Answering = Callable[..., Any]
-"""What a worker is: given a method's name and its arguments, it answers."""
+"""Function that a worker serves: given a method's name and its arguments, it returns the answer."""
 
 Done = Callable[[], None]
 """Called whenever a part of longer work is done, from any thread."""
 
 
 def _unheard() -> None:
-    """Nobody wants to know."""
+    """Ignore the report of progress."""
 
 
 class Process:
-    """A process of ours, from the side of its parent; of ``one_thread`` if so."""
+    """Worker process, seen from its parent; with ``one_thread`` its libraries use one thread."""
 
     def __init__(self, one_thread: bool = False) -> None:
         self._process = subprocess.Popen(
@@ -61,45 +61,45 @@ class Process:
         self._questions, self._answers = self._process.stdin, self._process.stdout
 
     def tell(self, *message: Any) -> None:
-        """Say what to do. Raises :class:`MethodFailed` if it is gone."""
+        """Send a message. Raises :class:`MethodFailed` if the process has ended."""
         try:
             _write(self._questions, message)
         except OSError as error:
             raise _gone(error) from error
 
     def answer(self) -> Any:
-        """Wait for its next answer. Raises :class:`MethodFailed` if it is gone."""
+        """Wait for the next answer. Raises :class:`MethodFailed` if the process has ended."""
         try:
             return pickle.loads(_read(self._answers))
         except (EOFError, OSError) as error:
             raise _gone(error) from error
 
     def end(self) -> None:
-        """End it, busy or not."""
+        """Kill the process, busy or not."""
         self._process.kill()
         self._process.communicate()
 
 
 class Workers:
-    """Objects in processes of their own, called all together."""
+    """Objects in separate processes, called all together."""
 
     def __init__(self, processes: list[Process]) -> None:
         self._processes = processes
 
     def call(self, method: str, *arguments: Sequence[Any], done: Done = _unheard) -> list[Any]:
-        """Call a method of every worker, each with its own share of the ``arguments``.
+        """Call a method of every worker, each with its share of the ``arguments``.
 
-        ``done`` is called whenever one of them says that something is done. Raises what one of them
-        raised, once all have answered; :class:`MethodFailed` if one is gone.
+        ``done`` is called whenever a worker reports that a part is done. Once all have answered, an
+        exception of a worker is raised; :class:`MethodFailed` if a process has ended.
         """
         return self.begin(method, *arguments, done=done)()
 
     def begin(
         self, method: str, *arguments: Sequence[Any], done: Done = _unheard
     ) -> Callable[[], list[Any]]:
-        """Begin with such a call; what is returned waits for the answers, and raises as it does.
+        """Begin such a call; return a function that waits for the answers and raises as it does.
 
-        Nothing else may be asked of the workers before.
+        No other call may be made to the workers until then.
         """
         shares = zip(*arguments, strict=True)
         for process, share in zip(self._processes, shares, strict=True):
@@ -109,10 +109,10 @@ class Workers:
 
 @contextmanager
 def workers(make: Callable[[Any, Done], Answering], settings: Sequence[Any]) -> Iterator[Workers]:
-    """Start a worker of one thread for each of the ``settings``, and end them all at the end.
+    """Start a worker with one thread for each of the ``settings``, and end them all at the end.
 
-    What ``make`` makes of them lives in the worker; it says by the second argument of ``make`` that
-    something is done.
+    ``make`` is called in the worker; its second argument is a function that reports that a part of
+    the work is done.
     """
     with _processes(
         _serve, [(make, setting) for setting in settings], one_thread=True
@@ -121,9 +121,9 @@ def workers(make: Callable[[Any, Done], Answering], settings: Sequence[Any]) -> 
 
 
 class Beside:
-    """A process of one thread that does jobs one after the other, while this one works.
+    """Background process with one thread that does jobs one after the other.
 
-    It begins with the first job, and ends, busy or not, with :meth:`close`.
+    It starts with the first job, and :meth:`close` ends it, busy or not.
     """
 
     def __init__(self) -> None:
@@ -131,9 +131,9 @@ class Beside:
         self._asking = ThreadPoolExecutor(1)
 
     def begin(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-        """Begin with a function; what is returned waits for its answer, and raises what it raised.
+        """Begin a function; the returned function waits for its result, or raises its exception.
 
-        Raises :class:`MethodFailed` if the process is gone.
+        Raises :class:`MethodFailed` if the process has ended.
         """
         if self._process is None:
             self._process = Process(one_thread=True)
@@ -141,7 +141,7 @@ class Beside:
         return self._asking.submit(_asked, self._process, function, arguments).result
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         process, self._process = self._process, None
         if process is not None:
             process.end()
@@ -151,11 +151,11 @@ class Beside:
 def share_out(
     tasks: Sequence[Task], beside: Beside | None = None, done: Done = _unheard, own: int = 0
 ) -> list[Any]:
-    """Do tasks, those from the beginning on here, those from the end on in a process ``beside``.
+    """Do tasks here from the first onwards, and in the process ``beside`` from the last backwards.
 
-    The first ``own`` are done here in any case. ``done`` is called whenever one is. Returns what
-    each of them returned. Raises what one of them raised; if that was one here, or Ctrl-C, the
-    process beside ends as it is.
+    The first ``own`` tasks are done here in any case. ``done`` is called after each task. Returns
+    the results of the tasks. Raises the exception of a task; if a task here raised it, or after
+    Ctrl-C, the process ``beside`` is ended at once.
     """
     answers: list[Any] = [None] * len(tasks)
     first, left = deque(range(own)), deque(range(own, len(tasks)))
@@ -190,7 +190,7 @@ def share_out(
 
 
 def _asked(process: Process, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """What a process answers."""
+    """Send a function to a process and return its answer, or raise its exception."""
     process.tell(function, arguments)
     answer = process.answer()
     if isinstance(answer, Exception):
@@ -202,7 +202,7 @@ def _asked(process: Process, function: Callable[..., Any], arguments: tuple[Any,
 def _processes(
     target: Callable[..., None], arguments: Sequence[tuple[Any, ...]], one_thread: bool = False
 ) -> Iterator[list[Process]]:
-    """Processes that run ``target``; ended, busy or not, at the end."""
+    """Yield processes that run ``target``, and end them, busy or not, at the end."""
     processes: list[Process] = []
     try:
         for _ in arguments:
@@ -216,17 +216,17 @@ def _processes(
 
 
 class _Done:
-    """What a process says whenever a part of its work is done."""
+    """Message that a part of the work of a process is done."""
 
 
 class _Hearing:
-    """Takes what a process says as it comes, whatever others say meanwhile."""
+    """Thread that receives the messages of one process, independently of other processes."""
 
     def __init__(self, process: Process, done: Done) -> None:
         self._process, self._done = process, done
         self._answer: Any = None
         self._gone: Exception | None = None
-        # No thread of a pool: Ctrl-C does not wait for it.
+        # Not a thread of a pool, so that Ctrl-C does not wait for it.
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
 
@@ -239,7 +239,7 @@ class _Hearing:
             self._gone = error
 
     def answer(self) -> Any:
-        """Its answer, once it is there."""
+        """Wait for the answer and return it."""
         self._thread.join()
         if self._gone is not None:
             raise self._gone
@@ -247,7 +247,7 @@ class _Hearing:
 
 
 def _answers(hearings: list[_Hearing]) -> list[Any]:
-    """An answer from every process; raises the first that is an exception."""
+    """Return the answer of every process; raise the first that is an exception."""
     answers = [hearing.answer() for hearing in hearings]
     for answer in answers:
         if isinstance(answer, Exception):
@@ -261,7 +261,7 @@ def _gone(error: Exception) -> MethodFailed:
     )
 
 
-# --- messages: their length, and what pickle makes of them ---------------------------------------
+# --- messages: their length, followed by the pickled content --------------------------------------
 
 
 def _write(stream: IO[bytes], message: Any) -> None:
@@ -272,7 +272,7 @@ def _write(stream: IO[bytes], message: Any) -> None:
 
 
 def _read(stream: IO[bytes]) -> bytes:
-    """A message that is not unpickled yet. Raises EOFError where the other end has gone."""
+    """Return a message, still pickled. Raises EOFError if the other end has closed."""
     length = int.from_bytes(_bytes(stream, LENGTH), "little")
     return _bytes(stream, length)
 
@@ -288,23 +288,23 @@ def _bytes(stream: IO[bytes], number: int) -> bytes:
 
 
 def main() -> None:
-    """Do what is told on stdin, and leave Ctrl-C to the parent."""
+    """Run the function received on stdin, and leave Ctrl-C to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Whatever a library prints is no part of the answer. It goes to stderr line by line: what is in
-    # a buffer is lost where the parent ends this process.
+    # Output of libraries is not part of the answer. It goes to stderr line by line, because a
+    # buffer would be lost when the parent ends this process.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     sys.stdout = sys.stderr
     messages: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_listen, args=(messages,), daemon=True).start()
-    # Here, for what is imported with a message may want to be in the main thread.
+    # Unpickled here, because modules imported with a message may need the main thread.
     target, parts = pickle.loads(messages.get())
     target(messages, answers, *parts)
 
 
 def _listen(messages: SimpleQueue[bytes]) -> None:
-    """Take in what the parent says; end when it ends, however busy this process is."""
-    # Not sys.stdin, whose lock the end of this process would wait for.
+    """Receive messages of the parent; end this process with the parent, even while it is busy."""
+    # Not sys.stdin: the end of this process would wait for its lock.
     with os.fdopen(os.dup(0), "rb") as questions:
         try:
             while True:
@@ -319,7 +319,7 @@ def _serve(
     make: Callable[[Any, Done], Answering],
     settings: Any,
 ) -> None:
-    """Answer calls, one after the other, and tell what of them is done."""
+    """Answer calls, one after the other, and report which parts are done."""
     answering = attempt(make, (settings, lambda: _write(answers, _Done())))
     while True:
         method, arguments = pickle.loads(messages.get())

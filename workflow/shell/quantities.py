@@ -1,25 +1,27 @@
-"""Main results of a run as people are told them: names, units, estimated errors, and curves.
+"""Main results of a run as shown to users: names, units, estimated errors, and curves.
 
-An analysis names them once, by dotted paths into the summary, for all that show or compare runs.
+An analysis declares them once, by dotted paths into the summary, for all code that shows or
+compares runs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-# Parts of a path in the results: any group, each a curve of its own, and the last numbered one.
+# Parts of a path in the results: any group, one curve for each, and the last numbered group.
 ANY, LAST = "*", "-1"
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number at ``path`` in the summary, in the base ``unit`` ("1" for none).
+    """Number at ``path`` in the summary, in the base ``unit`` ("1" for none).
 
-    ``group`` is what it is of, such as an interface, empty for the whole run. ``error`` is the
-    estimated relative error, None where nobody knows, of which ``error_of`` says what it covers.
-    ``everyday`` is the unit that people want to read, where there is only one. A ``budget`` is
-    what the error is of, in words, and where the summary has its parts, None for unknown ones, and
-    their ``total``. ``where`` in a run such a number is, as in increment 7, is told beside it.
+    ``group`` names the object it belongs to, such as an interface; it is empty for the whole run.
+    ``error`` is the estimated relative error, None if unknown, and ``error_of`` says what it
+    covers. ``everyday`` is the unit preferred by readers, if there is only one. ``budget``
+    describes the error in words, with the path in the summary of its parts (None for unknown ones)
+    and their ``total``. ``where`` is the place in the run to which the number belongs, such as
+    increment 7.
     """
 
     group: str
@@ -35,12 +37,13 @@ class Quantity:
 
 @dataclass(frozen=True)
 class CurvesOf:
-    """The datasets ``y`` against ``x``; ``*`` stands for any group, ``-1`` for the last numbered.
+    """Description of curves: datasets ``y`` against ``x``.
 
-    What stands for them in ``y`` does in ``x`` too. Of a dataset of several columns the last is
-    meant. Where ``x`` is a grid, ``y`` is a field over it, of a vector its first component, and the
-    curve goes along x through its middle. ``units`` are the base units of x and y ("1" for none, ""
-    where the case decides), of a contact over an area. ``logarithmic`` is the axis of y.
+    In the paths, ``*`` stands for any group and ``-1`` for the last numbered one; the groups found
+    in ``y`` are inserted in ``x`` too. The last column of a dataset with several columns is used.
+    If ``x`` is a grid, ``y`` is a field over it (the first component of a vector), and the curve
+    runs along x through the middle. ``units`` are the base units of x and y in a contact over an
+    area ("1" for none, "" where the case decides). ``logarithmic`` refers to the y axis.
     """
 
     title: str

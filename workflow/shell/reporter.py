@@ -1,4 +1,4 @@
-"""What a run says while it works: stages, forecasts, and everything of it in ``run.log``."""
+"""Reporter of a run: stages, forecasts and warnings, all of them logged in ``run.log``."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from workflow.shell.store import check_regular
 T = TypeVar("T")
 NOTHING_EXPECTED = RunTime(after=0.0)
 
-# Seconds of work before a forecast is told, those of a single step, of which some may be loading,
-# and those of a run for which none is needed.
+# Seconds of work before a forecast is shown; the same after a single step, which may include
+# loading; and the length of a run that needs no forecast.
 FIRST_WORK, FIRST_STEP, SHORT_RUN = 1.0, 10.0, 10.0
-# Share of the work at which what it has taken tells as much of the rest as what was expected.
+# Share of the work at which the measured time and the expected time have equal weight.
 LITTLE = 0.05
-# A forecast is told again when that of the whole time has changed by this factor.
+# A forecast is shown again when the forecast of the whole time has changed by this factor.
 CHANGED = 1.5
-# Seconds between two looks of a stage at how far it is, and between two lines about that where
+# Seconds between two updates of the progress of a stage, and between two lines about it where
 # there is no screen.
 LOOK, LINE = 0.1, 60.0
-# What is isolated from the run, as a warning names it.
+# Parts that are isolated from the run, as warnings name them.
 FORECAST, LOG, TERMINAL = "progress", "run.log", "terminal"
 
 
 @dataclass
 class _Course:
-    """The long part of a run, on the screen; ``told`` is the last forecast of its whole time."""
+    """Progress of the long part of a run; ``told`` is the last forecast of its whole time shown."""
 
     name: str
     row: Row
@@ -45,7 +45,7 @@ class _Course:
 
 
 class _Stage:
-    """Tells how far a stage is: a ``fe_models`` or ``wear`` callback, called as often as it may."""
+    """Progress callback of a stage for ``fe_models`` or ``wear``; it may be called at any rate."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class _Stage:
         self._said, self._isolated = self._looked, isolated
 
     def __call__(self, done: int, total: int) -> None:
-        """So many of ``total`` are done."""
+        """Show that ``done`` of ``total`` are done."""
         with self._isolated(FORECAST):
             self._look(done, total)
 
@@ -79,11 +79,12 @@ class _Stage:
 
 
 class Reporter:
-    """Times stages, logs lines, collects warnings, and forecasts how long the run will take.
+    """Reporter that times stages, logs lines, collects warnings and forecasts the run time.
 
-    What comes after its long part takes as much longer than ``expected`` as what came before it.
-    Nothing that it does ends a run: see ``isolated``, which keeps whatever else only shows a run
-    apart from it too. Raises UserError where a pipe, say, is in the place of its ``log``.
+    The time after the long part is scaled from its ``expected`` value by the same factor by which
+    the time before it was exceeded. Failures of the reporter never end a run; ``isolated`` protects
+    the run from other code that only shows it, too. Raises UserError if the path of ``log`` is not
+    a regular file, for example a pipe.
     """
 
     def __init__(
@@ -110,17 +111,17 @@ class Reporter:
 
     @property
     def spent(self) -> float:
-        """Time since it began [s]."""
+        """Time since the reporter was created [s]."""
         return time.perf_counter() - self._begin
 
     def say(self, line: str, always: bool = False) -> None:
-        """A line on the terminal and in the log; ``always`` if it is asked to be quiet too."""
+        """Write a line to the terminal and the log; ``always`` writes it even in quiet mode."""
         self._write(line)
         if always or self._loudness > Loudness.QUIET:
             self._print(line)
 
     def log(self, line: str) -> None:
-        """A line in the log only, unless it is asked to be verbose."""
+        """Write a line to the log, and to the terminal in verbose mode."""
         self._write(line)
         if self._loudness is Loudness.VERBOSE:
             self._print(line)
@@ -135,16 +136,16 @@ class Reporter:
             console().print(line, markup=False, soft_wrap=True)
 
     def warn(self, line: str) -> None:
-        """A warning: said once, and kept for the summary."""
+        """Show a warning once, and store it for the summary."""
         if line not in self.warnings:
             self.warnings.append(line)
             self.say(f"warning: {line}", always=True)
 
     @contextmanager
     def stage(self, name: str, of: str = "") -> Iterator[Progress]:
-        """Show and time a stage; seconds of the same name add up.
+        """Show and time a stage; times of stages with the same name are added.
 
-        What it gives may be told how many ``of`` its things are done, and how many there are.
+        The yielded callback takes the number of finished items, named by ``of``, and the total.
         """
         begin = time.perf_counter()
         try:
@@ -155,11 +156,11 @@ class Reporter:
             self.seconds[name] = self.seconds.get(name, 0.0) + spent
             self.log(f"{name}: {spent:.2f} s")
 
-    # -- how long it will take -----------------------------------------------------------------
+    # -- forecast ------------------------------------------------------------------------------
 
     @contextmanager
     def course(self, name: str) -> Iterator[None]:
-        """The long part of a run: :meth:`part` and :meth:`reached` tell how far it has got."""
+        """Show the long part of a run, whose progress :meth:`part` and :meth:`reached` report."""
         with self._screen.row(name) as row:
             self._course = _Course(name, row, Forecast())
             with self.isolated(FORECAST):
@@ -173,7 +174,7 @@ class Reporter:
 
     @contextmanager
     def part(self, begin: float, end: float, name: str = "") -> Iterator[None]:
-        """The work between two shares of the part around it, or of the course."""
+        """Mark work as the range between two shares of the enclosing part, or of the course."""
         (first, last), names = around = self._span, self._names
         size = last - first
         self._span = first + begin * size, first + end * size
@@ -185,10 +186,10 @@ class Reporter:
             self._span, self._names = around
 
     def _blended(self, measured: float, share: float) -> float:
-        """Time to the end of the course, as the ``share`` that is done tells, and as expected [s].
+        """Return the time to the end of the course, from the measured and the expected time [s].
 
-        The less is done, the less is known of what the rest will take: harmonics and contacts grow
-        on the way.
+        The smaller the finished ``share``, the more the expected time counts, because harmonics and
+        contacts become more expensive as the run proceeds.
         """
         expected = self.expected.course * (1.0 - share)
         if not measured * expected > 0.0:
@@ -197,23 +198,23 @@ class Reporter:
         return float(measured**trust * expected ** (1.0 - trust))
 
     def parts(self, items: Sequence[T], name: Callable[[T], str]) -> Iterator[T]:
-        """Items one after the other, each an equal :meth:`part` of the work, by its name."""
+        """Yield items one after the other, each as an equal and named :meth:`part` of the work."""
         for number, item in enumerate(items):
             with self.part(number / len(items), (number + 1) / len(items), name(item)):
                 yield item
 
     def goes_on(self) -> None:
-        """What has been told to be done was kept from an earlier run."""
+        """Mark the work reported so far as restored from an earlier run."""
         if self._course:
             self._course.forecast.go_on()
 
     def doing(self, text: str) -> None:
-        """What the long part is about just now, to be seen on the screen."""
+        """Show on the screen what the long part is doing at the moment."""
         if self._course:
             self._course.row.doing(text)
 
     def reached(self, share: float, text: str = "") -> None:
-        """About so large a ``share`` of the present part is done; ``text`` says how far that is."""
+        """Report that about this ``share`` of the present part is done; ``text`` describes it."""
         if self._course is not None:
             with self.isolated(FORECAST):
                 self._tell(self._course, share, text)
@@ -239,7 +240,7 @@ class Reporter:
 
 
 class _Telling(logging.Handler):
-    """Hands what is logged deep below to the reporter of a run."""
+    """Logging handler that passes log records to the reporter of a run."""
 
     def __init__(self, reporter: Reporter) -> None:
         super().__init__()
@@ -252,7 +253,7 @@ class _Telling(logging.Handler):
 
 @contextmanager
 def telling(reporter: Reporter) -> Iterator[None]:
-    """What our modules log goes to the reporter."""
+    """Pass the log records of our modules to the reporter."""
     ours, handler = logging.getLogger("workflow"), _Telling(reporter)
     ours.addHandler(handler)
     try:

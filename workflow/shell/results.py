@@ -21,13 +21,14 @@ from workflow.shell.dataset import Dataset, Datasets, unit_in
 from workflow.shell.store import replacing_hdf5
 from workflow.shell.versions import versions
 
-# Datasets of more values are worth packing.
+# Datasets with more values than this are compressed.
 LARGE = 4096
-# Attribute of the file that says what is in it.
+# Attribute of the file that describes its contents.
 CONTENTS = "contents"
-# Bytes of like weight together: a sixth less to store, in three quarters of the time.
+# The shuffle filter stores bytes of equal significance together: it saves a sixth of the space and
+# a quarter of the time.
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-# Attribute of a dataset: the group that has the coordinates along its axes, if not its own.
+# Attribute of a dataset: the group with the coordinates along its axes, if it is another group.
 COORDINATES = "coordinates"
 # The last axes of a field on a grid.
 CELLS = "x", "y"
@@ -35,23 +36,26 @@ CELLS = "x", "y"
 
 @dataclass(frozen=True)
 class Along:
-    """Datasets as long as that of this name are curves over it: of their group, or with a path."""
+    """Marks datasets as curves over the dataset of this name, in the same group or given by a path.
+
+    It applies to the datasets that have the same length.
+    """
 
     name: str
 
 
 @dataclass(frozen=True)
 class On:
-    """Datasets whose last two axes are as long as those of the ``grid`` are fields on its cells.
+    """Marks datasets as fields on the cells of the ``grid``, a group that ``put_grid`` has written.
 
-    It is the group that :meth:`ResultsWriter.put_grid` has written.
+    It applies to the datasets whose last two axes have the shape of the grid.
     """
 
     grid: str
 
 
 class ResultsWriter:
-    """Fills an open HDF5 file with datasets; ``line`` contacts have forces and energies per mm."""
+    """Writer of datasets to an HDF5 file; ``line`` contacts have forces and energies per mm."""
 
     def __init__(self, file: h5py.File, line: bool = False) -> None:
         self._file, self._line = file, line
@@ -59,10 +63,10 @@ class ResultsWriter:
     def put(
         self, group: str, datasets: Datasets, over: Along | On | None = None, /, **attributes: Any
     ) -> None:
-        """Write a group, new or there already; attributes that are None are left out.
+        """Write datasets to a new or existing group; attributes that are None are left out.
 
-        HDF5's labels of axes say what datasets are ``over``: they name datasets of the same group,
-        or of that in their attribute ``coordinates``.
+        The axes that datasets are ``over`` are stored as HDF5 axis labels, which name datasets of
+        the same group, or of the group in the attribute ``coordinates``.
         """
         place = self._file.require_group(group)
         for name, dataset in datasets.items():
@@ -93,12 +97,12 @@ class ResultsWriter:
                 dataset.attrs.update({COORDINATES: elsewhere} if elsewhere else {})
 
     def put_contents(self, contents: Any) -> None:
-        """What is in the file, as those who draw it are told."""
+        """Write the description of the file's contents, for the functions that draw it."""
         kind = TypeAdapter(type(contents))
         self._file.attrs[CONTENTS] = kind.dump_json(contents).decode("utf-8")
 
     def put_grid(self, group: str, grid: Grid, frame: Frame | None = None) -> None:
-        """A grid, the centres of its cells and, where it is known, its place in space."""
+        """Write a grid, the centres of its cells and, if known, its position in space."""
         line = {"line": True} if grid.line else {}
         placed = {} if frame is None else {"origin": frame.origin, "axes": frame.axes}
         centres = {
@@ -110,7 +114,7 @@ class ResultsWriter:
 
 @contextmanager
 def writing(path: Path, line: bool = False) -> Iterator[ResultsWriter]:
-    """Write an HDF5 file, which appears once it is whole."""
+    """Write an HDF5 file, which appears under its name once it is complete."""
     with replacing_hdf5(path) as stream, h5py.File(stream, "w") as file:
         yield ResultsWriter(file, line)
 
@@ -119,7 +123,7 @@ def writing(path: Path, line: bool = False) -> Iterator[ResultsWriter]:
 def run_results(
     run: Run[Any], case: Case, attributes: Mapping[str, Any], line: bool = False
 ) -> Iterator[ResultsWriter]:
-    """Write ``results.h5`` of a run: what it is of, the ``case`` as run, and what is put there."""
+    """Write ``results.h5`` of a run: its kind and title, the ``case`` as run, and its datasets."""
     path = run.folder.reserve("results.h5", "fields and curves, with units and descriptions")
     with writing(path, line) as writer:
         writer.put("/", {}, kind=run.kind, title=case.title, **attributes)
@@ -128,9 +132,9 @@ def run_results(
 
 
 def read_contents(path: Path, kind: type[Any] | None) -> Any:
-    """What is in the ``results.h5`` of a run that has ended, as a description of a ``kind``.
+    """Return the description, of type ``kind``, of the ``results.h5`` of a finished run.
 
-    Raises UserError where it does not say, or in the words of another version.
+    Raises UserError if the description is missing or was written by another version.
     """
     with h5py.File(path) as file:
         text = file.attrs.get(CONTENTS, "")
@@ -143,11 +147,11 @@ def read_contents(path: Path, kind: type[Any] | None) -> Any:
 
 
 def grid_of(group: h5py.Group) -> Grid:
-    """The grid that a group's attributes describe."""
+    """Return the grid that a group's attributes describe."""
     (nx, ny), (dx, dy) = group.attrs["shape"], group.attrs["pitch"]
     return Grid((int(nx), int(ny)), (float(dx), float(dy)), bool(group.attrs.get("line", False)))
 
 
 def frame_of(group: h5py.Group) -> Frame:
-    """The frame that a group's attributes describe."""
+    """Return the frame that a group's attributes describe."""
     return Frame(np.array(group.attrs["origin"]), np.array(group.attrs["axes"]))

@@ -1,8 +1,8 @@
-"""About how long a run takes, known before anything is meshed: an order of magnitude.
+"""Estimate of the duration of a run before anything is meshed, to an order of magnitude.
 
-Work is counted (unknowns, factors, contact problems, points of curves) and multiplied by what a
-unit of it took on one core of a server of 2024, at some 2.5 GHz. Structures that are in the cache
-take nothing; that is not looked into.
+The work is counted (unknowns, factors, contact problems, points of curves) and multiplied by the
+time of one unit of it, measured on one core of a 2024 server at about 2.5 GHz. Structures in the
+cache would take no time; the estimate does not look there.
 """
 
 from __future__ import annotations
@@ -11,22 +11,23 @@ from dataclasses import dataclass
 
 from workflow.shell.forecast import about
 
-# Python, libraries and compiled laws to load [s]; figures of an analysis.
+# Time to load Python, libraries and compiled laws, and to draw the figures of an analysis [s].
 START, FIGURES = 3.0, 3.0
-# A convolution on the half-space, and each of its cells in it [s].
+# Fixed time of a convolution on the half-space, and time for each of its cells [s].
 CONVOLUTION, CELL = 3e-4, 1.2e-7
-# Convolutions of a contact problem begun from the one before: on an area, on a line, with friction.
+# Convolutions of a contact problem started from the previous one: area, line, with friction.
 NORMAL, NORMAL_LINE, FRICTIONAL = 15, 6, 60
-# Sparse factors of a body, all of its right-hand sides included, of so many nodes [s].
+# Time for the sparse factors and all right-hand sides of a body with FACTOR_NODES nodes [s], and
+# its growth exponent.
 FACTOR, FACTOR_NODES, FACTOR_POWER = 5.0, 3e4, 1.6
 
 
 @dataclass(frozen=True)
 class RunTime:
-    """Seconds ``before`` the long part of a run, in its ``course``, and ``after`` that.
+    """Estimated seconds ``before`` the long part of a run, in its ``course``, and ``after`` it.
 
-    Where ``unknown`` says what of the work cannot be counted before the run, the seconds are those
-    of the work that ``assumed`` names in its place. Both are empty otherwise.
+    If some work cannot be counted before the run, ``unknown`` says which, and the seconds are for
+    the work that ``assumed`` names in its place. Both are empty otherwise.
     """
 
     before: float = 0.0
@@ -37,17 +38,17 @@ class RunTime:
 
     @property
     def begun(self) -> float:
-        """Until the long part begins."""
+        """Time until the long part begins [s]."""
         return START + self.before
 
     @property
     def seconds(self) -> float:
-        """Of all."""
+        """Total time [s]."""
         return self.begun + self.course + self.after
 
     @property
     def short(self) -> str:
-        """The time in a few words, with the work that it is for where that is assumed."""
+        """The time in a few words, with the assumed work if some is unknown."""
         return f"{about(self.seconds)} for {self.assumed}" if self.unknown else about(self.seconds)
 
     @property
@@ -57,10 +58,10 @@ class RunTime:
 
 
 def solves(count: float, cells: int, convolutions: float) -> float:
-    """Contact problems on a grid of so many cells [s]."""
+    """Return the time of ``count`` contact problems on a grid of ``cells`` cells [s]."""
     return count * convolutions * (CONVOLUTION + CELL * cells)
 
 
 def factors(nodes: float) -> float:
-    """Sparse factors of a body of so many nodes [s]."""
+    """Return the time of the sparse factors of a body with this number of nodes [s]."""
     return float(FACTOR * (nodes / FACTOR_NODES) ** FACTOR_POWER)

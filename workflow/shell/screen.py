@@ -1,6 +1,6 @@
-"""What goes on, live at the foot of a terminal: a row for each thing that is being done.
+"""Live progress at the bottom of a terminal: one row for each task in progress.
 
-Where stderr is no terminal, or one that only prints, there is nothing to see of it.
+Nothing is shown if stderr is not a terminal, or only a dumb one.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from rich.table import Column
 
 from workflow.shell.isolation import Isolation
 
-# Seconds before a row is worth being looked at.
+# Seconds after which a row is shown.
 BRIEF = 0.3
 BAR_WIDTH = 20
-# Columns of a terminal below which words have no room beside a bar.
+# Width of a terminal, in columns, below which there is no room for words next to a bar.
 NARROW = 60
-# What is isolated from the run, as a warning names it.
+# Part that is isolated from the run, as a warning names it.
 ROWS = "progress on the terminal"
 
 
 class Loudness(IntEnum):
-    """What is said on the terminal; the log has everything."""
+    """Amount of output on the terminal; the log has everything."""
 
     QUIET = 0  # errors and warnings
     NORMAL = 1
@@ -35,31 +35,31 @@ class Loudness(IntEnum):
 
 @cache
 def console() -> Console:
-    """That of stderr: one for all, for a run within a run has its rows below those around it."""
+    """Return the console on stderr, shared so that the rows of nested runs appear together."""
     return Console(stderr=True, highlight=False, force_jupyter=False)
 
 
 class Row:
-    """One thing that is being done: how far that is, as a bar and in words."""
+    """Row of one task, with its progress as a bar and in words."""
 
     def __init__(self, rows: Progress, task: TaskID, isolated: Isolation) -> None:
         self._rows, self._task, self._isolated = rows, task, isolated
 
     def show(self, share: float, at: str, left: str) -> None:
-        """``share`` of it is done: how far ``at`` that is, and how long what is ``left`` takes."""
+        """Show the finished ``share``, its description ``at``, and the remaining time ``left``."""
         with self._isolated(ROWS):
             self._rows.update(self._task, total=1.0, completed=share, at=at, left=left)
 
     def doing(self, at: str) -> None:
-        """No more of it is done than before."""
+        """Change the description; the finished share stays the same."""
         with self._isolated(ROWS):
             self._rows.update(self._task, at=at)
 
 
 class _Rows(Progress):
-    """The first row where there is no other, and those that are there for a while.
+    """Progress display of the tasks that have lasted a while, or else of the first one.
 
-    What is done at once would only flicker.
+    Shorter tasks would only flicker.
     """
 
     def get_renderables(self) -> Iterable[RenderableType]:
@@ -68,7 +68,7 @@ class _Rows(Progress):
 
 
 class Screen:
-    """The rows of a run; nothing is shown if it is not ``on``, and nothing ends a run."""
+    """Rows of a run; nothing is shown unless it is ``on``, and its failures never end a run."""
 
     def __init__(self, on: bool, isolated: Isolation | None = None) -> None:
         self._isolated = isolated or Isolation(lambda warning: None)
@@ -82,13 +82,13 @@ class Screen:
 
     @property
     def on(self) -> bool:
-        """Whether rows can be seen."""
+        """Whether rows are visible."""
         return self._on
 
     @contextmanager
     def row(self, name: str) -> Iterator[Row]:
-        """A row as long as something of this ``name`` is being done."""
-        # The number of none: where a row cannot be added, there is none to be shown.
+        """Show a row while a task of this ``name`` is in progress."""
+        # An invalid number, used if the row cannot be added.
         task = TaskID(-1)
         with self._isolated(ROWS):
             task = self._rows.add_task(name, total=None, at="", left="")
@@ -100,14 +100,14 @@ class Screen:
                 self._rows.reset(self._between)
 
     def close(self) -> None:
-        """Nothing is left on the terminal."""
+        """Remove all rows from the terminal."""
         if self._on:
             with self._isolated(ROWS):
                 self._rows.stop()
 
 
 def _columns(width: int) -> tuple[ProgressColumn, ...]:
-    """Name, bar, seconds, how far, how long; what is too long for so wide a terminal is cut."""
+    """Return the columns: name, bar, seconds, progress, remaining time; long texts are cut."""
     cut = Column(ratio=1, no_wrap=True, overflow="ellipsis")
     name, seconds = TextColumn("{task.description}", markup=False), TimeElapsedColumn()
     at = TextColumn("{task.fields[at]}", markup=False, table_column=cut)

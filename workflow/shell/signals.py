@@ -1,4 +1,4 @@
-"""How a program takes the signals that are to end it."""
+"""Handling of the signals that end a program."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import signal
 
 
 def end_tidily() -> None:
-    """Let what a batch system ends a program with do as Ctrl-C does, unless that is ignored."""
+    """Treat the signal by which a batch system ends a program like Ctrl-C, unless it is ignored."""
     if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def hear_no_more() -> None:
-    """Let nobody who presses Ctrl-C again disturb the end of a program."""
+    """Ignore further signals, so that a second Ctrl-C does not disturb the end of a program."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)

@@ -1,10 +1,11 @@
-"""The steps of a run on the disk, for one that is cut off to go on from.
+"""Storage of the steps of a run on disk, from which an interrupted run resumes.
 
-Finished steps are appended, some seconds of work to a file of ``jumps``; the checkpoint ties them
-together and has the states that marches have reached. A resumed run executes its code from the
-start, but takes what a step gave from there instead of computing it: warm starts, caches and
-tallies come about as they did, and the first step that is computed begins with what the run
-that was cut off had. What a step gives is handed on as it would be read, in memory order too.
+Finished steps are appended to files of ``jumps``, each with some seconds of work. The checkpoint
+ties these files together and holds the states that marches have reached. A resumed run executes its
+code from the start, but reads the results of finished steps instead of computing them. Warm starts,
+caches and counters therefore develop as before, and the first computed step starts from the same
+state as in the interrupted run. The result of a new step is returned as it would be read from disk,
+including its memory order.
 """
 
 from __future__ import annotations
@@ -26,25 +27,25 @@ from workflow.shell.packing import PackingError, packed, unpacked
 from workflow.shell.store import read_arrays, write_arrays
 
 T = TypeVar("T")
-# Place of a step: its number among those of the step that it belongs to, below that one's place.
+# Place of a step: the place of the enclosing step, followed by its number within that step.
 Place = tuple[int, ...]
 
-# Of the time before a save, what the last one took at most; packing takes about as much again.
+# Largest share of the time that saving may take; packing takes about as much again.
 SHARE = 0.005
-# Seconds that the first one is taken to need: a run of four seconds keeps nothing.
+# Assumed seconds of the first save, so that a run of four seconds stores nothing.
 FIRST_SAVE = 0.02
-# Name of the entry that has the places of steps, and of those that have what the steps gave.
+# Names of the arrays with the places of steps, the ends of their results, and the results.
 PLACES, ENDS, VALUES = "places", "ends", "values"
-# Attribute of the checkpoint: how many steps have been taken to get there.
+# Attribute of the checkpoint: the number of steps computed so far.
 STEPS = "steps"
 
 
 @contextmanager
 def kept_steps(run: Run[Any]) -> Iterator[RunSteps]:
-    """The steps of a run, those that an earlier process has kept first.
+    """Yield the steps of a run, which return the stored results of an earlier process first.
 
-    Whatever ends the run, its finished steps are kept, unless the disk is what ends it. Raises
-    UserError where they are those of another version.
+    Finished steps are saved however the run ends, unless an error of the disk ends it. Raises
+    UserError if the stored steps are of another version.
     """
     steps = RunSteps(run)
     try:
@@ -58,7 +59,7 @@ def kept_steps(run: Run[Any]) -> Iterator[RunSteps]:
 
 
 class RunSteps:
-    """Takes the steps of a run: see :class:`sa_solver.steps.Steps`."""
+    """Steps of a run that are stored on disk: see :class:`sa_solver.steps.Steps`."""
 
     def __init__(self, run: Run[Any]) -> None:
         self._folder, self._reporter, self._provenance = run.folder, run.reporter, run.provenance
@@ -66,7 +67,7 @@ class RunSteps:
         self._before = 0 if run.kept is None else int(run.kept.attributes[STEPS])
         self._marches = {} if run.kept is None else _unjoined(run.kept.arrays)
         self._kept = self._of_files()
-        # What has not been brought to the disk yet, those last taken last.
+        # Results that are not saved yet, in the order of their steps.
         self._new: dict[Place, bytes] = {}
         self._above: Place = ()
         self._count = self._computed = 0
@@ -108,7 +109,7 @@ class RunSteps:
         self._reporter.log(f"steps: {self._computed} computed, {self._before} taken as kept")
 
     def save(self) -> None:
-        """Bring to the disk what is not there."""
+        """Save the results that are not on disk yet."""
         if not self._new and not self._marches:
             return
         begun = time.perf_counter()
@@ -123,20 +124,20 @@ class RunSteps:
         self._cost = self._saved - begun
 
     def _compute(self) -> None:
-        """A step is to be computed: nothing tells the time of those that were kept."""
+        """Tell the reporter, before the first computed step, that earlier ones were restored."""
         if self._before and not self._going_on:
             self._going_on = True
             self._reporter.goes_on()
 
     # -- places -------------------------------------------------------------------------------
     def _next(self) -> Place:
-        """The place of the step that comes next."""
+        """Return the place of the next step."""
         self._count += 1
         return (*self._above, self._count - 1)
 
     @contextmanager
     def _inside(self, place: Place) -> Iterator[None]:
-        """Steps are those of the step at a place."""
+        """Nest the given steps under ``place``."""
         outside = self._above, self._count
         self._above, self._count = place, 0
         try:
@@ -144,9 +145,9 @@ class RunSteps:
         finally:
             self._above, self._count = outside
 
-    # -- what steps gave ----------------------------------------------------------------------
+    # -- results of steps ---------------------------------------------------------------------
     def _keep(self, among: dict[Place, bytes], place: Place, name: str, value: T, warned: int) -> T:
-        """Keep what a step gave, with the warnings on the way, in place of its own steps."""
+        """Store the result of a step and its warnings, in place of the steps within it."""
         begun = time.perf_counter()
         data, faithful = packed((name, value, self._reporter.warnings[warned:]))
         inside = place[:-1] if among is self._marches else place
@@ -165,7 +166,7 @@ class RunSteps:
         return handed_on
 
     def _read(self, data: bytes, name: str) -> Any:
-        """What a step gave; its warnings are said again. Raises UserError for another step."""
+        """Return the result of a step and repeat its warnings. Raises UserError for other steps."""
         try:
             written, value, warnings = unpacked(data)
         except PackingError as error:
@@ -181,7 +182,11 @@ class RunSteps:
         return UserError(f"{of} ({wrong}); {self._folder.again}")
 
     def _of_files(self) -> dict[Place, bytes]:
-        """What steps gave, but for those of a step that is known itself, or has gone on since."""
+        """Return the stored results of steps.
+
+        Steps within a step whose result is stored are left out, and so are steps of a march before
+        the state that it has reached.
+        """
         kept: dict[Place, bytes] = {}
         for number in range(len(self._files)):
             arrays, _ = read_arrays(self._folder.jump(number))
@@ -200,11 +205,11 @@ def _within(place: Place, other: Place) -> bool:
     return place[: len(other)] == other
 
 
-# --- on the disk --------------------------------------------------------------------------------
+# --- on disk ------------------------------------------------------------------------------------
 
 
 def _joined(steps: Mapping[Place, bytes]) -> dict[str, Any]:
-    """What steps gave as arrays, one after the other."""
+    """Return the results of steps as arrays, one after the other."""
     lengths = [len(data) for data in steps.values()]
     return {
         PLACES: np.array([".".join(map(str, place)) for place in steps], dtype="S"),
@@ -214,7 +219,7 @@ def _joined(steps: Mapping[Place, bytes]) -> dict[str, Any]:
 
 
 def _unjoined(arrays: Mapping[str, Any]) -> dict[Place, bytes]:
-    """The inverse of :func:`_joined`."""
+    """Return the results of steps from the arrays of :func:`_joined`."""
     places = [tuple(map(int, place.split(b"."))) for place in arrays[PLACES].tolist()]
     ends, values = arrays[ENDS].tolist(), arrays[VALUES].tobytes()
     spans = pairwise([0, *ends])

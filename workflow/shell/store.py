@@ -1,8 +1,8 @@
-"""Files that are never half written, and that are known to be what was written.
+"""Files that are never half written, and whose content is verified when they are read.
 
-A file is written beside its place, brought to the disk and renamed: whoever is killed in the
-middle, by a power failure even, leaves the old one. A file of arrays begins with the digest of its
-name and of all that follows.
+A new file is written next to the old one, flushed to disk and renamed, so the old file survives if
+the process is killed in the middle, even by a power failure. A file of arrays begins with a digest
+of its name and of all following bytes.
 """
 
 from __future__ import annotations
@@ -22,21 +22,22 @@ import h5py
 
 from workflow.errors import UNWRITTEN, UserError
 
-# In the names of files that are being written: before their ending, which some writers go by.
+# Part of the names of files that are being written; it precedes their ending, which some writers
+# depend on.
 PARTIAL = ".part"
 PARTIAL_NAME = re.compile(rf"\..+\.\d+{re.escape(PARTIAL)}(\.\w+)?")
 
-# Bytes at the beginning of a file that HDF5 leaves to others: the digest is there.
+# Size of the user block at the beginning of an HDF5 file, which holds the digest [bytes].
 SEAL = 512
 
 
 class DamagedFile(UserError):
-    """A file that is not, bit for bit, what was written under its name."""
+    """Error for a file whose content differs from what was written under its name."""
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A path to write to; it takes the place of ``path`` once the writing has ended well.
+    """Yield a path to write to; the file replaces ``path`` once it is written without error.
 
     An error of the disk names ``path``.
     """
@@ -55,20 +56,20 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text."""
+    """Write a text file."""
     with replacing(path) as partial:
         partial.write_text(text, encoding="utf-8")
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a dictionary of numbers and texts."""
+    """Write a dictionary of numbers and texts as JSON."""
     write_text(path, json.dumps(content, indent=2) + "\n")
 
 
 class _Outlet(io.RawIOBase):
-    """A file that takes every byte, whatever becomes of the disk: ``error`` says what did.
+    """File object that accepts every byte even if the disk fails, and stores the ``error``.
 
-    HDF5 ends the whole process where it cannot write. From where the disk is full the file goes on
+    HDF5 aborts the whole process if it cannot write. After a failure the file therefore continues
     in memory.
     """
 
@@ -113,9 +114,9 @@ class _Outlet(io.RawIOBase):
 
 @contextmanager
 def replacing_hdf5(path: Path) -> Iterator[io.RawIOBase]:
-    """The same for HDF5: a file to open with h5py, which may end well where the disk is full.
+    """Yield a file object for h5py that replaces ``path`` once it is written without error.
 
-    Raises OSError then.
+    Writing to a full disk does not fail at once; OSError is raised at the end.
     """
     with replacing(path) as partial, partial.open("wb+", buffering=0) as file:
         outlet = _Outlet(file)
@@ -127,7 +128,7 @@ def replacing_hdf5(path: Path) -> Iterator[io.RawIOBase]:
 def write_arrays(
     path: Path, arrays: Mapping[str, Any], attributes: Mapping[str, Any] | None = None
 ) -> str:
-    """Write named arrays (names may hold slashes) and attributes of the root; the digest of it."""
+    """Write named arrays (slashes allowed) and attributes of the root; return the digest."""
     with replacing_hdf5(path) as stream:
         with h5py.File(stream, "w", userblock_size=SEAL) as file:
             for name, values in arrays.items():
@@ -140,9 +141,9 @@ def write_arrays(
 
 
 def read_arrays(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """All arrays of a file by their full name, and the attributes of its root.
+    """Return all arrays of a file by their full names, and the attributes of its root.
 
-    Raises :class:`DamagedFile` before HDF5 has seen a file that is not what was written.
+    Raises :class:`DamagedFile`, before HDF5 opens the file, if its content has changed.
     """
     checked_digest(path)
     arrays: dict[str, Any] = {}
@@ -157,11 +158,11 @@ def read_arrays(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def check_regular(path: Path) -> None:
-    """Raise :class:`DamagedFile` where a pipe, say, is in the place of a file of ours.
+    """Raise :class:`DamagedFile` if a pipe or a device is in the place of one of our files.
 
-    It would be waited for; a device may have no end.
+    Reading a pipe would block; a device may have no end.
     """
-    # Looked at once: another process may remove its lock meanwhile.
+    # A single system call, because another process may remove its lock between two of them.
     with suppress(OSError):
         mode = path.stat().st_mode
         if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
@@ -169,19 +170,25 @@ def check_regular(path: Path) -> None:
 
 
 def opened(path: Path) -> io.BufferedReader:
-    """A file of ours, open to be read. Raises OSError; :class:`DamagedFile` for what is none."""
+    """Open one of our files to read it.
+
+    Raises OSError, or :class:`DamagedFile` if it is not a regular file.
+    """
     check_regular(path)
     return path.open("rb")
 
 
 def read_bytes(path: Path) -> bytes:
-    """All of a file of ours. Raises OSError; :class:`DamagedFile` for what is none."""
+    """Return the bytes of one of our files.
+
+    Raises OSError, or :class:`DamagedFile` if it is not a regular file.
+    """
     with opened(path) as file:
         return file.read()
 
 
 def checked_digest(path: Path) -> str:
-    """The digest of a file of arrays. Raises :class:`DamagedFile` if it is not what was written."""
+    """Return the digest of a file of arrays. Raises :class:`DamagedFile` if it does not match."""
     with opened(path) as raw:
         kept = raw.read(SEAL).rstrip(b"\0").decode("ascii", "replace")
         if _digest(raw, path.name) != kept:
@@ -190,9 +197,9 @@ def checked_digest(path: Path) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of any file; empty for one that cannot be read.
+    """Return the SHA-256 of any file, or an empty text if it cannot be read.
 
-    Raises :class:`DamagedFile` for what is no file.
+    Raises :class:`DamagedFile` for a pipe or a device.
     """
     try:
         with opened(path) as raw:
@@ -202,12 +209,12 @@ def file_digest(path: Path) -> str:
 
 
 def json_digest(content: Any) -> str:
-    """SHA-256 of what JSON can say, whatever the order of its keys."""
+    """Return the SHA-256 of a JSON value, independent of the order of its keys."""
     as_read = json.loads(json.dumps(content))
     return hashlib.sha256(json.dumps(as_read, sort_keys=True).encode("utf-8")).hexdigest()
 
 
 def _digest(raw: io.BufferedReader | io.RawIOBase, name: str) -> str:
-    """SHA-256 of a file's name and of all that follows the place of its digest."""
+    """Return the SHA-256 of a file's name and of all bytes after the digest."""
     raw.seek(SEAL)
     return hashlib.file_digest(raw, lambda: hashlib.sha256(name.encode("utf-8"))).hexdigest()

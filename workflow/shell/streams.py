@@ -1,7 +1,4 @@
-"""The standard streams of a process, of which a program may be started without some.
-
-And what they show of letters that their encoding does not have.
-"""
+"""Standard streams of a process, some of which may be closed or lack letters in their encoding."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ import re
 import sys
 from typing import TextIO
 
-# How letters beyond ASCII are spelled where there are none.
+# Replacements for non-ASCII letters that an encoding lacks.
 SPELLED = {
     "µ": "u",
     "μ": "u",
@@ -42,14 +39,14 @@ HANDLER = "fretscale.spelled"
 
 
 def hold_standard_streams() -> None:
-    """Let no file get the number of a stream that is closed, here or in processes of ours."""
+    """Keep other files from getting the numbers of closed standard streams, here or in children."""
     while (free := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(free, True)
     os.close(free)
 
 
 def spell_what_streams_lack() -> None:
-    """Let output and messages spell what their encoding does not have: um for µm, m^2 for m²."""
+    """Make stdout and stderr replace letters that their encoding lacks: um for µm, m^2 for m²."""
     codecs.register_error(HANDLER, _spelled)
     for stream in (sys.stdout, sys.stderr):
         _reconfigure(stream)
@@ -62,7 +59,7 @@ def _reconfigure(stream: TextIO | None) -> None:
 
 
 def _spelled(error: UnicodeError) -> tuple[str, int]:
-    """What stands for the letters that cannot be encoded, and where to go on."""
+    """Return the replacement of letters that cannot be encoded, and the position to continue at."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     missing = error.object[error.start : error.end]
@@ -71,5 +68,5 @@ def _spelled(error: UnicodeError) -> tuple[str, int]:
 
 
 def _ascii(letter: str) -> str:
-    """A letter that no spelling is known of, by its number."""
+    """Return a letter that has no replacement as its escaped code."""
     return letter if letter.isascii() else letter.encode("ascii", "backslashreplace").decode()

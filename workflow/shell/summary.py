@@ -1,4 +1,4 @@
-"""``summary.json``: what every run says of itself around the numbers of its analysis."""
+"""Contents of ``summary.json`` that all runs share, in addition to the numbers of the analysis."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from workflow.shell.quantities import Quantity
 from workflow.shell.reporter import TERMINAL
 from workflow.shell.versions import versions
 
-# Stages whose seconds are told at the end; all of them are in the summary.
+# Number of stages whose seconds are shown at the end; the summary has all of them.
 MOST_STAGES = 3
 
 
 def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> None:
-    """Write the summary of a run, which marks it as finished, and say how it ended.
+    """Write the summary of a run, which marks it as finished, and report how it ended.
 
-    What it has found on the way is removed.
-
-    ``numbers`` are what the analysis tells, ``lines`` the same in short.
+    The intermediate files are removed. ``numbers`` are the results of the analysis, ``lines`` the
+    same in short.
     """
     reporter, measured = run.reporter, run.measured()
     for doubt in doubts_of_measured(measured):
@@ -52,11 +51,11 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
 
 
 class QuantityError(ValueError):
-    """A dotted path that leads to no number of a summary; the message says where it ends."""
+    """Error for a path that leads to no number of a summary; the message says where it ends."""
 
 
 def required_number(summary: Mapping[str, Any], path: str) -> float:
-    """The number that a dotted path leads to. Raises QuantityError."""
+    """Return the number at a dotted path. Raises QuantityError."""
     node: Any = summary
     for key in path.split("."):
         try:
@@ -69,7 +68,7 @@ def required_number(summary: Mapping[str, Any], path: str) -> float:
 
 
 def counted_from_first(summary: Mapping[str, Any], path: str) -> str:
-    """The path to the same number with the items of lists counted from the first: 4 for -1."""
+    """Return the path with negative list positions counted from the first: 4 for -1, say."""
     node: Any = summary
     keys = path.split(".")
     for place, key in enumerate(keys):
@@ -84,7 +83,7 @@ def counted_from_first(summary: Mapping[str, Any], path: str) -> str:
 
 
 def number_at(summary: Mapping[str, Any], path: str) -> float | None:
-    """The number that a dotted path leads to; None where there is none."""
+    """Return the number at a dotted path, or None if there is none."""
     try:
         return required_number(summary, path)
     except QuantityError:
@@ -92,11 +91,11 @@ def number_at(summary: Mapping[str, Any], path: str) -> float | None:
 
 
 def told(summary: Mapping[str, Any], quantities: Iterable[Quantity]) -> list[Quantity]:
-    """Those of the quantities of which the summary has a number."""
+    """Return the quantities for which the summary has a number."""
     return [quantity for quantity in quantities if number_at(summary, quantity.path) is not None]
 
 
 def estimate(summary: Mapping[str, Any], path: str, what: str) -> dict[str, Any]:
-    """The relative error at a path and what it is of, as fields of a quantity."""
+    """Return the relative error at a path, and what it covers, as fields of a quantity."""
     error = number_at(summary, path)
     return {} if error is None else {"error": abs(error), "error_of": what}

@@ -1,8 +1,9 @@
-"""What must be there before anything is installed: Python's venv and the mesher's libraries.
+"""Check of the system before anything is installed: Python's venv and the mesher's libraries.
 
 The gmsh wheel brings its library but not the X11 and OpenGL libraries that it is linked with, and
-a bare Debian has no ``ensurepip``. All that is missing is found at once here, with the Debian
-packages that have it. Standard library only; run by path, for this package may need more:
+a bare Debian has no ``ensurepip``. This check finds everything that is missing at once, with the
+Debian packages that contain it. It uses the standard library only, and is run by its path because
+this package may need more:
 
     python3 -I workflow/shell/system_check.py            # installs what is missing, or says how
     python -I workflow/shell/system_check.py --imports   # later: can what was installed be used?
@@ -31,7 +32,7 @@ DEBIAN_PACKAGES = {
     "libX11.so.6": "libx11-6",
     "libgomp.so.1": "libgomp1",
 }
-# If nothing is there yet; measured on Debian 12.
+# Upper bound for a system with none of the packages, measured on Debian 12.
 MOST = "at most 70 MB to download, 230 MB on disk, a minute"
 UPDATE = "apt-get update"
 INSTALL = "apt-get install -y --no-install-recommends"
@@ -39,14 +40,14 @@ FAILED = 3
 
 
 def missing_packages() -> list[str]:
-    """Debian packages of the libraries that cannot be loaded; empty on other systems than Linux."""
+    """Return the Debian packages of libraries that cannot be loaded; empty except on Linux."""
     if not sys.platform.startswith("linux"):
         return []
     return [package for name, package in DEBIAN_PACKAGES.items() if not _loads(name)]
 
 
 def remedy(error: Exception) -> str | None:
-    """One line saying what to install if ``error`` is a library that could not be loaded."""
+    """Return advice on what to install if ``error`` is a library that could not be loaded."""
     if "cannot open shared object file" not in str(error):
         return None
     packages = missing_packages()
@@ -74,7 +75,7 @@ def _loads(name: str) -> bool:
 
 
 def _prepared() -> str | None:
-    """Install what is missing if that needs no password; what is still in the way, or None."""
+    """Install missing packages if that needs no password; return what is still missing, or None."""
     packages = _wanted()
     if packages and _may_install():
         print(f"fretscale: installing {' '.join(packages)}: {MOST}", flush=True)
@@ -85,7 +86,7 @@ def _prepared() -> str | None:
 
 
 def _wanted() -> list[str]:
-    """Debian packages of all that is missing, the virtual environment's among them."""
+    """Return the Debian packages of everything missing, including the virtual environment's."""
     version = "{}.{}".format(*sys.version_info)
     there = all(map(importlib.util.find_spec, ("ensurepip", "venv")))
     return missing_packages() + ([] if there else [f"python{version}-venv"])
@@ -111,7 +112,7 @@ def _install(packages: list[str]) -> None:
 
 
 def _imported() -> str | None:
-    """Why the mesher cannot be used, or None."""
+    """Return why the mesher cannot be used, or None."""
     try:
         # By name: a static import would break the rule that only fe_models knows gmsh.
         importlib.import_module("gmsh")
@@ -121,7 +122,7 @@ def _imported() -> str | None:
 
 
 def main(arguments: list[str]) -> int:
-    """With ``--imports`` check what was installed, else what must be there before."""
+    """Check what was installed with ``--imports``, or else what must exist before."""
     wrong = _imported() if "--imports" in arguments else _prepared()
     if wrong:
         print(f"fretscale: {wrong}", file=sys.stderr)

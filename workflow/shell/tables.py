@@ -1,6 +1,6 @@
 """Tables as CSV files: a row of headings, each ``name [unit]``, and a row for every point.
 
-They are read by :mod:`workflow.case.table_file`.
+:mod:`workflow.case.table_file` reads them.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from workflow.shell.dataset import Datasets
 from workflow.shell.store import replacing
 
-# Digits of curves: more than they are known to, fewer than it takes to read back the same.
+# Digits of curves: more than their accuracy, fewer than an exact copy needs.
 DIGITS = 9
 
 
 def write_curves(path: Path, curves: Datasets) -> None:
-    """Write datasets as columns; of what has several values at a point, one column for each."""
+    """Write datasets as columns; several values at a point become several columns."""
     columns: dict[str, NDArray[Any]] = {}
     for name, dataset in curves.items():
         if dataset.values.ndim == 1:
@@ -38,10 +38,10 @@ def write_table(
     digits: int | None = None,
     note: str = "",
 ) -> None:
-    """Write ``columns`` of equal length by their headings, below a comment if there is a ``note``.
+    """Write ``columns`` of equal length with their headings, after a comment line ``note``, if any.
 
-    Numbers have so many digits, or as many as it takes to read back the same. None is an empty
-    cell.
+    Numbers are written with ``digits`` digits, or with as many as an exact copy needs. None becomes
+    an empty cell.
     """
     values = [v.tolist() if isinstance(v, np.ndarray) else v for v in columns.values()]
     with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
@@ -54,7 +54,7 @@ def write_table(
 
 
 def heading(name: str, unit: str) -> str:
-    """What stands above a column; nothing is said of a unit that goes without saying."""
+    """Return the heading of a column, with its unit if there is one."""
     return f"{name} [{unit}]" if unit else name
 
 

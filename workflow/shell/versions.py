@@ -1,4 +1,4 @@
-"""Versions of what a result depends on."""
+"""Versions of the software that results depend on."""
 
 from __future__ import annotations
 
@@ -15,5 +15,5 @@ def _packages() -> dict[str, str]:
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that compute."""
+    """Return the versions of Python and of the packages that compute."""
     return {"python": platform.python_version()} | _packages()
