@@ -22,7 +22,7 @@ import numpy as np
 from sa_solver import checks
 from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
 from sa_solver.cycles.increments import dissipated, of_nearest
-from sa_solver.dissimilar.contact import CoupledContact, CoupledState
+from sa_solver.dissimilar.contact import CoupledContact, CoupledContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact, NormalStart, NormalState, checked_heights
@@ -32,7 +32,7 @@ from sa_solver.tangential.contact import FrictionLimitError, TangentialContact, 
 from sa_solver.tangential.gross_slip import SlidingRule, gross_slip, slides, sliding_direction
 from sa_solver.types import Array, Mask
 
-_State = TypeVar("_State", TangentialState, CoupledState)
+_State = TypeVar("_State", TangentialState, CoupledContactState)
 
 
 class FrictionError(InputError):
@@ -345,7 +345,7 @@ class FrictionalContact:
         before: ContactState,
         pressed: Mask,
         offset: Array,
-        state: TangentialState | CoupledState,
+        state: TangentialState | CoupledContactState,
         motion: Array,
     ) -> Array:
         """Return the slip ``(2, nx, ny)`` [mm] of an increment, also in cells that separate in it.
@@ -431,7 +431,7 @@ class FrictionalContact:
         limit: Array,
         start: Array,
         near: Array | None,
-    ) -> CoupledState:
+    ) -> CoupledContactState:
         """Return dissimilar bodies in gross slip by the energy of ``load``.
 
         The search begins from the tractions ``start`` and the motion ``near``, if known.
@@ -441,17 +441,19 @@ class FrictionalContact:
         motion = (load.motion[0], True, True, load.motion[3], load.motion[4], not self.grid.line)
         shear = limit * sliding_direction(load.values[1:3])[:, None, None]
 
-        def solve(shift: Array, tolerance: float, last: CoupledState | None) -> CoupledState:
+        def solve(
+            shift: Array, tolerance: float, last: CoupledContactState | None
+        ) -> CoupledContactState:
             values[1:3] = shift
             begin = start if last is None else last.traction
             return self._coupled.solve(
                 height, offset, values, motion, tolerance=tolerance, start=begin
             )
 
-        def limit_of(state: CoupledState) -> Array:
+        def limit_of(state: CoupledContactState) -> Array:
             return np.asarray(self.friction * state.pressure)
 
-        def slip_of(state: CoupledState) -> Array:
+        def slip_of(state: CoupledContactState) -> Array:
             motion = state.rigid[list(PLANAR)]
             return self._slip(before, state.pressure > 0.0, offset, state, motion)
 

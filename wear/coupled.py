@@ -22,7 +22,7 @@ from sa_solver.types import Array, resultant_change
 from wear.contact.contacts import KINETICS, Contacts
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
-from wear.load_sources import LoadSource
+from wear.load_sources import CycleSource
 from wear.steps.steppers import ROUNDING
 from wear.worn import Spent
 
@@ -293,7 +293,7 @@ class CoupledWear:
     """
 
     settings: CoupledSettings
-    source: LoadSource
+    source: CycleSource
     contacts: Contacts
     observers: Sequence[Observer] = ()
 

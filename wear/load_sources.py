@@ -13,7 +13,7 @@ from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
 
 
-class LoadSource(Protocol):
+class CycleSource(Protocol):
     """Protocol of a source of loads and slips of every contact over one closed cycle.
 
     Worn depths are nodal, ``(n,)`` per contact, of both bodies together [mm]. Coefficients of

@@ -24,7 +24,7 @@ from fe_models.matrices.unknowns import (
     mirrored,
 )
 from fe_models.meshes.structure_mesh import MeshError
-from fe_models.readers.nastran.cards import Entry, bulk_data
+from fe_models.readers.nastran.cards import BulkEntry, bulk_data
 
 DMIG = "DMIG"
 # Forms of a matrix: square, rectangular with numbered columns, and symmetric with one triangle.
@@ -81,7 +81,7 @@ def _later(matrix: _Dmig, row: dict[Label, int]) -> Callable[[], Values]:
 class _Dmig:
     """Matrix in DMIG entries: its header, and its values by row and column."""
 
-    def __init__(self, header: Entry) -> None:
+    def __init__(self, header: BulkEntry) -> None:
         self.header, self.form = header, header.whole(FORM)
         if self.form not in (SQUARE, SYMMETRIC, *RECTANGULAR):
             raise header.wrong(f"form {self.form}; allowed: 1, 2, 6 or 9")
@@ -89,7 +89,7 @@ class _Dmig:
             raise header.wrong("complex numbers; allowed: real ones, type 1 or 2")
         self.entries: dict[tuple[Label, Label], float] = {}
 
-    def take(self, column: Entry) -> None:
+    def take(self, column: BulkEntry) -> None:
         """Add the entries of a column."""
         to = _label(column, 1)
         for first in range(ENTRIES, len(column.fields), ENTRIES):
@@ -123,16 +123,16 @@ class _Dmig:
         return mirrored(matrix)
 
 
-def _label(entry: Entry, first: int) -> Label:
+def _label(entry: BulkEntry, first: int) -> Label:
     """Return point and component; the component of a scalar point may be left out."""
     component = entry.text(first + 1)
     return entry.whole(first), entry.whole(first + 1) if component else 0
 
 
-def _gathered(entries: list[Entry]) -> dict[str, _Dmig]:
+def _gathered(entries: list[BulkEntry]) -> dict[str, _Dmig]:
     """Return the matrices by name, each with its columns."""
     found: dict[str, _Dmig] = {}
-    columns: defaultdict[str, list[Entry]] = defaultdict(list)
+    columns: defaultdict[str, list[BulkEntry]] = defaultdict(list)
     for entry in entries:
         name = entry.text(0).upper()
         # A header has 0 where a column has its point, followed by its form.

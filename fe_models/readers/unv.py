@@ -70,7 +70,7 @@ NODE, ELEMENT = "7", "8"
 
 
 @dataclass(frozen=True)
-class Dataset:
+class UnvDataset:
     """Dataset of a universal file: its number, the place where it begins, and its lines."""
 
     number: str
@@ -108,7 +108,7 @@ def read_unv(path: Path) -> GroupedMesh:
     return replace(FlatFile(scope).mesh(), left=notes, scene=Scene(ignored=notes), unit=unit)
 
 
-def _datasets(path: Path) -> Iterator[Dataset]:
+def _datasets(path: Path) -> Iterator[UnvDataset]:
     """Yield the datasets, which stand between lines of -1."""
     inside: list[tuple[SourceLine, str]] | None = None
     with open_text(path) as file:
@@ -116,7 +116,7 @@ def _datasets(path: Path) -> Iterator[Dataset]:
             place, text = SourceLine(path, number), line.rstrip()
             if text.strip() == DELIMITER:
                 if inside:
-                    yield Dataset(inside[0][1].strip(), inside[0][0], inside[1:])
+                    yield UnvDataset(inside[0][1].strip(), inside[0][0], inside[1:])
                 inside = [] if inside is None else None
             elif inside is not None:
                 inside.append((place, text))
@@ -130,7 +130,7 @@ def _datasets(path: Path) -> Iterator[Dataset]:
         )
 
 
-def _nodes(scope: Scope, dataset: Dataset) -> None:
+def _nodes(scope: Scope, dataset: UnvDataset) -> None:
     for (place, head), (below, coordinates) in _in_groups(dataset, 2):
         number = integer(place, _fields(place, head)[0])
         if number in scope.nodes:
@@ -150,14 +150,14 @@ def _fields(place: SourceLine, text: str) -> list[str]:
 
 
 def _in_groups(
-    dataset: Dataset, count: int
+    dataset: UnvDataset, count: int
 ) -> Iterator[tuple[tuple[SourceLine, str], tuple[SourceLine, str]]]:
     if len(dataset.lines) % count:
         raise MeshError(f"{dataset.lines[-1][0]}: the dataset ends early: it may be damaged")
     return zip(dataset.lines[0::count], dataset.lines[1::count], strict=True)
 
 
-def _elements(scope: Scope, dataset: Dataset) -> None:
+def _elements(scope: Scope, dataset: UnvDataset) -> None:
     rows = iter(dataset.lines)
     for place, text in rows:
         head = [integer(place, field) for field in text.split()]
@@ -206,7 +206,7 @@ def _advice(kind: int) -> str:
     return next((advice for kinds, advice in KINDS if kind in kinds), "")
 
 
-def _groups(scope: Scope, dataset: Dataset) -> None:
+def _groups(scope: Scope, dataset: UnvDataset) -> None:
     """Read groups with their members, two to a line; a name may occur only once.
 
     Salome writes a blank line for the members of an empty group.
@@ -240,7 +240,7 @@ def _groups(scope: Scope, dataset: Dataset) -> None:
                 extend(sets.add(name, {}), {"": numbers})
 
 
-def _refuse_other_systems(dataset: Dataset) -> None:
+def _refuse_other_systems(dataset: UnvDataset) -> None:
     """Raise :class:`MeshError` unless all coordinate systems are the global one.
 
     That is one of type 0 with a unit matrix.
@@ -261,7 +261,7 @@ def _refuse_other_systems(dataset: Dataset) -> None:
             )
 
 
-def _unit(dataset: Dataset) -> LengthUnit:
+def _unit(dataset: UnvDataset) -> LengthUnit:
     """Return the unit of length, from the factor on the dataset's second line.
 
     A length divided by the factor is in metres. Without a factor, the code of the system of units
@@ -281,7 +281,7 @@ def _unit(dataset: Dataset) -> LengthUnit:
     return LengthUnit(*((near[0], SIZES[near[0]]) if near else (f"{size:g} mm", size)), source)
 
 
-def _unread(dataset: Dataset) -> str:
+def _unread(dataset: UnvDataset) -> str:
     """Describe in one line a dataset that is not read; empty if there is nothing to describe.
 
     Raises :class:`MeshError` for a dataset of an old form that contains the mesh.

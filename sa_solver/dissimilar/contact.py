@@ -88,7 +88,7 @@ class CoupledContactError(ContactProblemError):
 
 
 @dataclass(frozen=True)
-class CoupledState(TractionState):
+class CoupledContactState(TractionState):
     """Solution of one increment.
 
     ``traction`` (qx, qy, p) [MPa] and ``displacement`` K t [mm] are ``(3, nx, ny)``; the ``slip``
@@ -172,7 +172,7 @@ class CoupledContact:
         tolerance: float = TOLERANCE,
         start: Array | None = None,
         compliance: Array | None = None,
-    ) -> CoupledState:
+    ) -> CoupledContactState:
         """Solve for the tractions and motions at the end of one increment.
 
         Parameters
@@ -211,7 +211,7 @@ class CoupledContact:
         values = checks.array("values", values, (6,), error=error)
         self._check(values, motion)
 
-        def pressed(height: Array) -> CoupledState:
+        def pressed(height: Array) -> CoupledContactState:
             problem = self._problem(height, offset, values, motion, compliance)
             apart = self._apart(problem)
             state = self._unloaded(problem) if apart else self._search(problem, tolerance, start)
@@ -224,7 +224,7 @@ class CoupledContact:
     # -- steps of solve -----------------------------------------------------------------------
     def _search(
         self, problem: CoupledProblem, tolerance: float, start: Array | None
-    ) -> CoupledState:
+    ) -> CoupledContactState:
         """Solve by Newton's method and, where it fails, by the splitting from its last state."""
         if start is not None and start.shape != problem.offset.shape:
             raise CoupledContactError("start is from another grid: give a state on the same grid")
@@ -262,8 +262,8 @@ class CoupledContact:
         return self._level.begin(problem)
 
     def _split(
-        self, problem: CoupledProblem, tolerance: float, last: CoupledState | None
-    ) -> CoupledState:
+        self, problem: CoupledProblem, tolerance: float, last: CoupledContactState | None
+    ) -> CoupledContactState:
         """Iterate the splitting until the residuals of its solution are met, or it fails."""
         before = self.half_space.count
         whole, free = self._splitting, list(problem.free)
@@ -308,7 +308,7 @@ class CoupledContact:
             convolutions=self.half_space.count - before,
         )
 
-    def _splitting_state(self, problem: CoupledProblem, last: CoupledState) -> Array:
+    def _splitting_state(self, problem: CoupledProblem, last: CoupledContactState) -> Array:
         """Return the state of the splitting that corresponds to the ``last`` solution."""
         slip = problem.relative(last.traction, last.displacement, self._free(problem, last.rigid))
         slip[Z] -= problem.compliance * last.pressure
@@ -350,11 +350,11 @@ class CoupledContact:
             compliance=0.0 if compliance is None else compliance,
         )
 
-    def _state(self, problem: CoupledProblem, traction: Array, rigid: Array) -> CoupledState:
+    def _state(self, problem: CoupledProblem, traction: Array, rigid: Array) -> CoupledContactState:
         """Return the state with these tractions and free motions, not marked as converged."""
         displacement = self.half_space.displacement(traction)
         relative = problem.relative(traction, displacement, rigid)
-        return CoupledState(
+        return CoupledContactState(
             traction=traction,
             displacement=displacement,
             slip=np.where(traction[Z] > 0.0, relative[:Z], 0.0),
@@ -387,7 +387,7 @@ class CoupledContact:
         tilting = TILTS[0] in problem.free or TILTS[1] in problem.free
         return not tilting and float(problem.offset[Z].min()) >= 0.0
 
-    def _unloaded(self, problem: CoupledProblem) -> CoupledState:
+    def _unloaded(self, problem: CoupledProblem) -> CoupledContactState:
         """Return the unloaded state: the bodies just touch, or are apart by imposed motions."""
         if any(value for k, value in zip(problem.free, problem.target, strict=True) if k in PLANAR):
             raise FrictionLimitError(0.0, UNCARRIED)
@@ -402,7 +402,9 @@ class CoupledContact:
             border_load=0.0,
         )
 
-    def _failure(self, problem: CoupledProblem, state: CoupledState, tolerance: float) -> str:
+    def _failure(
+        self, problem: CoupledProblem, state: CoupledContactState, tolerance: float
+    ) -> str:
         measured, cells = state.residuals, np.count_nonzero(state.pressure)
         remedy = "take smaller increments, loosen the tolerance, or smooth or refine the heights"
         if cells < FEW_CELLS:
@@ -419,7 +421,7 @@ class CoupledContact:
         )
 
     def _overload(
-        self, problem: CoupledProblem, state: CoupledState, least: float = OVERLOAD
+        self, problem: CoupledProblem, state: CoupledContactState, least: float = OVERLOAD
     ) -> str:
         """Return a message if friction under the pressure of ``state`` carries too little load."""
         limit = self.friction * state.pressure

@@ -96,7 +96,7 @@ def runs_here() -> Iterator[None]:
     """Compute the contacts and pictures of a run in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact_workers, "workers", _workers)
-        patch.setattr(run, "Beside", _BesideHere)
+        patch.setattr(run, "WorkerProcess", _BesideHere)
         patch.setattr(drawing, "share_out", _in_order)
         yield
 

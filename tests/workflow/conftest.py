@@ -24,7 +24,7 @@ from tests.workflow.commands import invoke, runs_here
 from tests.workflow.mesh_scenes import pressed_blocks
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear import run as wear_run
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import WearContents
 from workflow.kinds import kinds
 from workflow.pictures import drawing
 from workflow.runs import run as running
@@ -39,7 +39,7 @@ INCREMENTS, PEAK, FRICTION = 22, 7, 0.4
 JUMPS = np.array([0.0, 5e3, 1e4, 2e4, 4e4, 7e4, 1e5])
 NAMES = tuple(sorted(INTERFACES))
 # Settings of the synthetic results.
-CONTENTS = Contents(
+CONTENTS = WearContents(
     names=NAMES,
     bodies=("disk", "blade"),
     jumps=len(JUMPS) - 1,
@@ -365,9 +365,9 @@ class Run:
 Runner = Callable[..., Run]
 
 
-def contents_of(folder: Path) -> Contents:
+def contents_of(folder: Path) -> WearContents:
     """Return the description of the contents of a finished wear run."""
-    return read_contents(folder / "results.h5", Contents)
+    return read_contents(folder / "results.h5", WearContents)
 
 
 def manifest_has_all(folder: Path) -> bool:
@@ -423,7 +423,7 @@ def _without_companions() -> Iterator[None]:
 def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Use separate processes for contacts and pictures, as outside of tests."""
     monkeypatch.setattr(contact_workers, "workers", processes.workers)
-    monkeypatch.setattr(running, "Beside", processes.Beside)
+    monkeypatch.setattr(running, "WorkerProcess", processes.WorkerProcess)
     monkeypatch.setattr(drawing, "share_out", processes.share_out)
 
 

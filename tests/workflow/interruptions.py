@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workflow.analyses.wear.recording import Recorder
+from workflow.analyses.wear.recording import FileRecorder
 from workflow.shell.store import read_arrays
 
 # Seconds within which everything must have ended.
@@ -20,7 +20,7 @@ posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @contextmanager
 def ctrl_c_after_jumps(jumps: int) -> Iterator[None]:
     """Send Ctrl-C to a run in this process once this number of jumps is stored."""
-    keep = Recorder.keep
+    keep = FileRecorder.keep
 
     def interrupting(recorder, state):
         keep(recorder, state)
@@ -28,7 +28,7 @@ def ctrl_c_after_jumps(jumps: int) -> Iterator[None]:
             raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Recorder, "keep", interrupting)
+        patch.setattr(FileRecorder, "keep", interrupting)
         yield
 
 

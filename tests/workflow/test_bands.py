@@ -16,17 +16,17 @@ from workflow.runs.job import Finished
 from workflow.shell.folder import OutputFolder
 from workflow.sweep.band_figures import write_band_figures
 from workflow.sweep.bands import FEWEST, band_of, curve_band
-from workflow.sweep.design import Run, runs_of
-from workflow.sweep.fitted import FittedParameter, FittedSample, read_fit
+from workflow.sweep.design import SweepRun, runs_of
+from workflow.sweep.fitted import DrawnParameter, FittedSample, read_fit
 from workflow.sweep.schema import load_sweep
-from workflow.sweep.table import Row
+from workflow.sweep.table import SweepRow
 
 FREE = (-np.inf, np.inf)
 
 
 def parameter(name, value, bounds, *, allowed=FREE, logarithmic=False, entries=None):
     entries = (name,) if entries is None else entries
-    return FittedParameter(name, value, "1", bounds, allowed, logarithmic, entries)
+    return DrawnParameter(name, value, "1", bounds, allowed, logarithmic, entries)
 
 
 def even(power, columns):
@@ -130,8 +130,10 @@ def test_curves_of_the_runs_are_drawn_with_bands(tmp_path):
             for name, values in {"energy": energy, **wear}.items():
                 file[f"evolution/{name}"] = values
                 file[f"evolution/{name}"].attrs["unit"] = "N mm" if name == "energy" else "1"
-        rows.append(Row(Run(f"{number}", {}), Finished(None, root, {})))
-    rows.append(Row(Run("broken", {}), Finished(None, tmp_path / "broken", None, "it broke")))
+        rows.append(SweepRow(SweepRun(f"{number}", {}), Finished(None, root, {})))
+    rows.append(
+        SweepRow(SweepRun("broken", {}), Finished(None, tmp_path / "broken", None, "it broke"))
+    )
     (path,) = write_band_figures("Joint", time.ANALYSIS, rows, tmp_path)
     assert path.name == "bands_over_energy.png"
     assert path.stat().st_size > 10_000

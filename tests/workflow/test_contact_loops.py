@@ -24,7 +24,7 @@ from workflow.analyses.wear.contact_loops import (
 )
 from workflow.analyses.wear.figures import loops as loops_figure
 from workflow.analyses.wear.figures import wear as figures
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import WearContents
 from workflow.analyses.wear.loop_table import COLUMNS
 from workflow.case.fields import Quantity
 from workflow.case.table_file import read_columns
@@ -222,7 +222,7 @@ def test_computed_loops_are_read_as_measured_ones(tmp_path):
 
 def test_figure_shows_the_loops(written, sphere):
     with h5py.File(written.results) as file:
-        figure = loops_figure.loops(file, Contents(("sphere",), ("body_1", "body_2"), 1))
+        figure = loops_figure.loops(file, WearContents(("sphere",), ("body_1", "body_2"), 1))
     kt = sphere.values["kt"] * 1e-3
     assert f"sphere {kt:.4g} → {kt:.4g} N/µm" in figure.get_suptitle()
     loop, stiffness, friction, energy = figure.axes

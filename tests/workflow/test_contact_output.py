@@ -16,7 +16,7 @@ from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.types import Grid, Material
 from tests.workflow.shown_files import check_arrays, check_scene, total
 from workflow.analyses.contact import ANALYSIS, figures
-from workflow.analyses.contact.datasets import Contents
+from workflow.analyses.contact.datasets import ContactContents
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.results import ContactOutcome, write_contact_results
 from workflow.analyses.contact.summary import loop_summary, state_summaries
@@ -31,7 +31,7 @@ FRICTION, LOAD, TANGENTIAL, RADIUS = 0.7, 400.0, 210.0, 10.0
 GRID = Grid.covering((1.0, 0.9), (100, 90))
 # Steps between turning points, of Q up, down and up again.
 STEPS = 12
-AREA = Contents(line=False, increments=1 + 3 * STEPS)
+AREA = ContactContents(line=False, increments=1 + 3 * STEPS)
 CASE = f"""\
 title: Ball
 analysis: contact
@@ -330,7 +330,7 @@ def test_line_has_no_maps_and_is_a_line(tmp_path):
     folder = OutputFolder(tmp_path / "out")
     folder.claim(case, force=False, resumable=False)
     write_contact_results(outcome, SimpleNamespace(kind="line", folder=folder))
-    told = ANALYSIS.pictures, Contents(line=True, increments=len(states)), folder.results
+    told = ANALYSIS.pictures, ContactContents(line=True, increments=len(states)), folder.results
     shown = folder.root / "paraview"
     write_paraview(*told, shown)
     line = pv.PVDReader(shown / "contact.pvd").read()[0]

@@ -22,7 +22,7 @@ from tests.workflow.test_loops_command import LOAD, record
 from tests.workflow.test_sweep import worn
 from wear.joints.measured.measured_loops import measure_loops
 from workflow.analyses.wear.figures.wear import figures_of
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import WearContents
 from workflow.chart import figures as chart_figures
 from workflow.commands import loops_figure
 from workflow.pictures.fitting import broken
@@ -54,7 +54,7 @@ def scene(
     size: tuple[float, float],
     names: tuple[str, ...],
     shape: tuple[int, int],
-) -> tuple[Path, Contents]:
+) -> tuple[Path, WearContents]:
     """Return synthetic results of some faces of a given size, with their contents."""
     loads = {name: 1.0 - 0.05 * number for number, name in enumerate(names)}
     monkeypatch.setattr(conftest, "SIZE", size)

@@ -10,7 +10,7 @@ import pytest
 
 from tests.marks import slow
 from tests.workflow.commands import command
-from workflow.analyses.wear.run_time import Steps, steps_of
+from workflow.analyses.wear.run_time import ExpectedSteps, steps_of
 from workflow.analyses.wear.structures import structure_of
 from workflow.interface.cases import check
 from workflow.kinds import analysis_of, load_case
@@ -243,7 +243,7 @@ def test_more_work_takes_longer(name: str, finer: str) -> None:
 NO_PICTURES = "output={figures: false, paraview: false, report: false}"
 
 
-def steps_expected(case: Any) -> Steps:
+def steps_expected(case: Any) -> ExpectedSteps:
     return steps_of(case, structure_of(case).extent(case))
 
 

@@ -408,10 +408,10 @@ def test_results_hold_nodes_loops_and_responses(ended, summary):
 
 def test_pads_in_paraview_balance(ended, summary, tmp_path):
     from workflow.analyses.vibration_wear import ANALYSIS
-    from workflow.analyses.vibration_wear.outcome import Contents
+    from workflow.analyses.vibration_wear.outcome import VibrationWearContents
     from workflow.pictures.drawing import write_paraview
 
-    write_paraview(ANALYSIS.pictures, Contents(at_nodes=True), ended.results, tmp_path)
+    write_paraview(ANALYSIS.pictures, VibrationWearContents(at_nodes=True), ended.results, tmp_path)
     check_arrays(tmp_path)
     check_scene(tmp_path / "view.py")
     pad, numbers = pyvista.read(tmp_path / "contact" / "00001.vtu"), summary["states"][1]
@@ -424,10 +424,10 @@ def test_pads_in_paraview_balance(ended, summary, tmp_path):
 @pytest.mark.slow
 def test_figures_are_drawn(ended, tmp_path):
     from workflow.analyses.vibration_wear import ANALYSIS
-    from workflow.analyses.vibration_wear.outcome import Contents
+    from workflow.analyses.vibration_wear.outcome import VibrationWearContents
     from workflow.pictures.drawing import write_figures
 
-    told = ANALYSIS.pictures, Contents(at_nodes=True), ended.results
+    told = ANALYSIS.pictures, VibrationWearContents(at_nodes=True), ended.results
     drawn = {path.stem for path in write_figures(*told, tmp_path)}
     assert drawn == {"frequency_response", "evolution", "profile", "loops"}
 

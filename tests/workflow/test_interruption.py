@@ -75,7 +75,7 @@ def test_states_are_written_as_time_allows(monkeypatch):
     monkeypatch.setattr(recording.checkpoint, "keep", keep)
     monkeypatch.setattr(recording, "write_arrays", lambda *_: "digest")
     monkeypatch.setattr(recording, "kept_tensions", lambda *_: {})
-    monkeypatch.setattr(recording.Recorder, "_loops", lambda *_: {})
+    monkeypatch.setattr(recording.FileRecorder, "_loops", lambda *_: {})
     contacts = SimpleNamespace(stages=[], fields=lambda *_: [])
     run = SimpleNamespace(
         reporter=SimpleNamespace(stage=lambda name: nullcontext()),
@@ -91,7 +91,7 @@ def test_states_are_written_as_time_allows(monkeypatch):
 
     for seconds, count in ((0.1, 1000), (100.0, 10)):
         written.clear()
-        recorder = recording.Recorder(run, None, 0, contacts, [], None)
+        recorder = recording.FileRecorder(run, None, 0, contacts, [], None)
         begun = now[0]
         with pytest.raises(KeyboardInterrupt):
             march(recorder, seconds, count)
@@ -374,7 +374,7 @@ def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     """It ends while it receives its task: a large setting does not fit into the pipe at once."""
     monkeypatch.setattr(sys, "executable", "/bin/true")
     gone = pytest.raises(MethodFailed, match="a process of the run has gone")
-    with closing(workers.Beside()) as beside, gone:
+    with closing(workers.WorkerProcess()) as beside, gone:
         beside.begin(len, bytes(1_000_000))()
 
 
@@ -391,13 +391,13 @@ def test_worker_that_cannot_be_set_up_says_why(separate_processes):
 @posix_only
 def test_workers_are_born_deaf_to_ctrl_c():
     """Workers ignore it from the start: the terminal sends it to the parent's session."""
-    with closing(workers.Beside()) as one, closing(workers.Beside()) as other:
+    with closing(workers.WorkerProcess()) as one, closing(workers.WorkerProcess()) as other:
         sessions = [process.begin(os.getsid, 0)() for process in (one, other)]
     assert len({os.getsid(0), *sessions}) == 3
 
 
 def test_a_process_beside_does_one_job_after_the_other():
-    with closing(workers.Beside()) as beside:
+    with closing(workers.WorkerProcess()) as beside:
         failing, *processes = beside.begin(divmod, 1, 0), *(beside.begin(os.getpid) for _ in "two")
         assert len({process() for process in processes} | {os.getpid()}) == 2
         with pytest.raises(ZeroDivisionError):
@@ -406,7 +406,7 @@ def test_a_process_beside_does_one_job_after_the_other():
 
 @posix_only
 def test_a_process_beside_ends_busy_or_not():
-    with closing(workers.Beside()) as beside:
+    with closing(workers.WorkerProcess()) as beside:
         answer = beside.begin(time.sleep, 600.0)
     # Had it been waited for, it would have answered.
     with pytest.raises((MethodFailed, CancelledError)):
@@ -415,11 +415,11 @@ def test_a_process_beside_ends_busy_or_not():
 
 def test_tasks_are_shared_with_a_process_beside():
     told, tasks = [], [(time.sleep, (0.2,)), (abs, (-1,)), (abs, (-2,)), (os.getpid, ())]
-    with closing(workers.Beside()) as beside:
+    with closing(workers.WorkerProcess()) as beside:
         _, *numbers, process = workers.share_out(tasks, beside, lambda: told.append(1))
     assert (numbers, len(told)) == ([1, 2], 4)
     assert process != os.getpid()
-    with closing(workers.Beside()) as beside:
+    with closing(workers.WorkerProcess()) as beside:
         *own, process = workers.share_out([(os.getpid, ())] * 3, beside, own=2)
     assert own == [os.getpid()] * 2
     assert process != os.getpid()
@@ -430,5 +430,5 @@ def test_tasks_are_shared_with_a_process_beside():
 def test_what_a_task_raises_is_raised_here_and_there(place):
     tasks = [(time.sleep, (0.05,)) for _ in range(4)]
     tasks[place] = divmod, (1, 0)
-    with closing(workers.Beside()) as beside, pytest.raises(ZeroDivisionError):
+    with closing(workers.WorkerProcess()) as beside, pytest.raises(ZeroDivisionError):
         workers.share_out(tasks, beside)

@@ -20,7 +20,7 @@ from workflow.analyses.rig.structure import own_laws
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.vibration.figures.shares import joint_states
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import VibrationContents
 from workflow.errors import UserError
 from workflow.kinds import load_case, parse_case, template
 from workflow.pictures.style import STYLE
@@ -180,7 +180,7 @@ def test_a_run_tells_what_each_joint_does(tmp_path):
         columns = np.column_stack([response["frequency"], slip, apart, lost])
         np.testing.assert_allclose(table, columns, rtol=1e-8)
         with rc_context(STYLE):
-            figure = joint_states(file, Contents(("00000",), (), False, False, joints=2))
+            figure = joint_states(file, VibrationContents(("00000",), (), False, False, joints=2))
             figure.canvas.draw()
         assert not problems(figure)
         _, slider, stop = figure.axes

@@ -8,7 +8,7 @@ import pytest
 from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array
 from wear.contact.interface import FirstContact
-from wear.contact.link import Link
+from wear.contact.link import StructureLink
 from workflow.analyses.wear.link_report import report_link
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import face_contact
@@ -36,7 +36,9 @@ def test_a_run_says_how_its_contacts_are_linked(whole) -> None:
     [((0.3, 0.01, 0.02), ""), ((0.3, 0.04, 0.01), "fewer nodes"), ((0.3, 0.02, 0.03), "coarse")],
 )
 def test_what_a_fit_leaves_is_warned_of(tmp_path, quality, told) -> None:
-    link = Link(np.zeros((1, 3, 5, 1)), np.array([[-1.0, 0.0], [1.0, 0.0]]), np.array(quality))
+    link = StructureLink(
+        np.zeros((1, 3, 5, 1)), np.array([[-1.0, 0.0], [1.0, 0.0]]), np.array(quality)
+    )
     reporter = Reporter(tmp_path / "log")
     report_link("flank", link, True, reporter)
     assert len(reporter.warnings) == bool(told)

@@ -18,7 +18,7 @@ from workflow.pictures.measured import MEASURED, with_measured
 from workflow.shell.analysis import Pictures
 from workflow.shell.curves import Curve
 from workflow.shell.measured import (
-    Points,
+    MeasuredPoints,
     check_measured,
     compared,
     doubts_of_measured,
@@ -52,12 +52,12 @@ def test_noise_of_known_size_has_its_chi_square_and_points_on_the_curve_have_non
     x = np.linspace(0.0, 1.0, 101)
     line = curve(x, 2.0 * x + 1.0)
     places, sigma = np.linspace(0.01, 0.99, 400), 0.05
-    exact = told(compared(entry(), line, Points(places, 2.0 * places + 1.0, None)))
+    exact = told(compared(entry(), line, MeasuredPoints(places, 2.0 * places + 1.0, None)))
     assert exact["rms_deviation"] < 1e-14
     assert exact["interpolation_error"] < 1e-14
     assert "reduced_chi_square" not in exact
     noise = np.random.default_rng(7).normal(0.0, sigma, places.size)
-    points = Points(places, 2.0 * places + 1.0 + noise, np.full(places.size, sigma))
+    points = MeasuredPoints(places, 2.0 * places + 1.0 + noise, np.full(places.size, sigma))
     found = told(compared(entry(), line, points))
     # For n independent points chi² per point is 1 with a standard deviation of sqrt(2/n).
     assert abs(found["reduced_chi_square"] - 1.0) < 4.0 * np.sqrt(2.0 / places.size)
@@ -69,27 +69,27 @@ def test_noise_of_known_size_has_its_chi_square_and_points_on_the_curve_have_non
 def test_error_of_interpolation_is_that_of_a_parabola() -> None:
     x = np.linspace(0.0, 1.0, 11)
     inner = np.linspace(0.11, 0.89, 57)
-    beside = compared(entry(), curve(x, x**2), Points(inner, inner**2, None))
+    beside = compared(entry(), curve(x, x**2), MeasuredPoints(inner, inner**2, None))
     assert beside.error == pytest.approx(np.abs(beside.computed - inner**2).max(), rel=1e-9)
     ends = np.array([0.03, 0.97])
-    beside = compared(entry(), curve(x, x**2), Points(ends, ends**2, None))
+    beside = compared(entry(), curve(x, x**2), MeasuredPoints(ends, ends**2, None))
     assert beside.error is not None
     assert beside.error >= np.abs(beside.computed - ends**2).max() > 0.0
-    two = compared(entry(), curve(x[[0, -1]], x[[0, -1]]), Points(ends, ends, None))
+    two = compared(entry(), curve(x[[0, -1]], x[[0, -1]]), MeasuredPoints(ends, ends, None))
     assert two.error is None
 
 
 def test_loop_is_compared_with_its_nearest_branch_and_nothing_is_extrapolated() -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 4001)
     circle = curve(np.cos(angle), np.sin(angle))
-    points = Points(np.array([0.6, 0.6, 1.5]), np.array([0.8, -0.7, 0.0]), None)
+    points = MeasuredPoints(np.array([0.6, 0.6, 1.5]), np.array([0.8, -0.7, 0.0]), None)
     found = told(compared(entry(), circle, points))
     assert found["nearest_of_several_branches"]
     assert found["outside"] == [1.5]
     assert found["points"] == 2
     assert found["largest"]["computed"] == pytest.approx(-0.8, abs=1e-5)
     assert found["mean_deviation"] == pytest.approx(-0.05, abs=1e-5)
-    none = told(compared(entry(), circle, Points(np.array([2.0]), np.array([0.0]), None)))
+    none = told(compared(entry(), circle, MeasuredPoints(np.array([2.0]), np.array([0.0]), None)))
     assert none["points"] == 0
     assert not list(lines_of_measured([none]))
     assert "not computed at 2" in next(doubts_of_measured([none]))

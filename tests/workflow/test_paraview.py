@@ -14,7 +14,7 @@ from sa_solver.types import Array, Frame, Grid
 from tests.workflow.conftest import CONTENTS, PEAK
 from tests.workflow.shown_files import check_arrays, check_scene, scene_of
 from workflow.analyses.wear import ANALYSIS
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import WearContents
 from workflow.analyses.wear.worn_structure import MOST_INCREMENTS, shown_increments
 from workflow.pictures.drawing import write_paraview
 from workflow.pictures.view import first_file
@@ -275,7 +275,7 @@ def test_run_that_wore_nothing_shows_each_thing_once(results: Path, tmp_path: Pa
     assert not (tmp_path / "mission_worn.pvd").exists()
 
 
-def write_wear(contents: Contents, results: Path, folder: Path) -> list[Path]:
+def write_wear(contents: WearContents, results: Path, folder: Path) -> list[Path]:
     assert ANALYSIS.pictures is not None
     return write_paraview(ANALYSIS.pictures, contents, results, folder)
 

@@ -24,7 +24,7 @@ from workflow import kinds
 from workflow.analyses import wear
 from workflow.analyses.wear import structures
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.case.sections import TwoMaterials, Wear
+from workflow.analyses.wear.case.sections import TwoMaterials, WearSection
 from workflow.analyses.wear.run_time import Extent
 from workflow.analyses.wear.structure import WearStructure
 from workflow.case.fields import Quantity
@@ -187,7 +187,7 @@ class StampCase(WearCase):
 
     structure: Stamp = entry("what is loaded")
     materials: TwoMaterials = entry("the two bodies in contact")
-    wear: Wear = entry("law, length of the run and step")
+    wear: WearSection = entry("law, length of the run and step")
 
     def loads_outline(self) -> list[tuple[str, str]]:
         return [("structure", f"stamp under {self.structure.force:g} N")]

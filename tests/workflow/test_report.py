@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.scenes import BALL
 from workflow.analyses import contact, time, vibration, vibration_wear, wear
-from workflow.analyses.contact.datasets import Contents as ContactContents
-from workflow.analyses.time.outcome import Contents as TimeContents
-from workflow.analyses.vibration.outcome import Contents as VibrationContents
-from workflow.analyses.vibration_wear.outcome import Contents as WornContents
-from workflow.analyses.wear.layout import Contents as WearContents
+from workflow.analyses.contact.datasets import ContactContents as ContactContents
+from workflow.analyses.time.outcome import MotionContents as TimeContents
+from workflow.analyses.vibration.outcome import VibrationContents as VibrationContents
+from workflow.analyses.vibration_wear.outcome import VibrationWearContents as WornContents
+from workflow.analyses.wear.layout import WearContents as WearContents
 from workflow.case.readable import percent, readable
 from workflow.case.typeset import exact_percent, given, number, typeset
 from workflow.errors import UserError

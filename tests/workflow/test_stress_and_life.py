@@ -15,7 +15,7 @@ from tests.marks import slow
 from tests.workflow.conftest import contents_of
 from tests.workflow.shown_files import check_arrays, check_scene
 from wear.contact.face_loads import CycleLoads
-from wear.contact.link import Link
+from wear.contact.link import StructureLink
 from wear.contact.tractions import CycleTractions
 from wear.cracking.bulk_stress import BulkStress
 from workflow.analyses.wear.body_stress import Planes, StressedBody, StressedCycle
@@ -275,7 +275,10 @@ def test_shear_that_nobody_knows_is_warned_of(share: float, count: int) -> None:
     [([0.01, 0.02], ""), ([0.01, 0.04], "known but for 4.0%"), ([0.01], "too few nodes")],
 )
 def test_what_is_not_known_of_the_structure_is_warned_of(fits: list[float], told: str) -> None:
-    links = [Link(np.zeros((1, 3, 2, 1)), np.zeros((2, 2)), np.array([0.3, q, 0.0])) for q in fits]
+    links = [
+        StructureLink(np.zeros((1, 3, 2, 1)), np.zeros((2, 2)), np.array([0.3, q, 0.0]))
+        for q in fits
+    ]
     carried = [BulkStress(link, METAL, 1) for link in links]
     moment = SimpleNamespace(carried=carried)
     stress: Any = SimpleNamespace(name="a", bulk=len(fits) == 2, moments={"unworn": moment})

@@ -17,9 +17,9 @@ from tests.workflow.commands import AS_PROCESS, invoke, jobs_here
 from tests.workflow.scenes import BALL
 from workflow.errors import CaseError
 from workflow.runs.job import Finished
-from workflow.sweep.design import Run, runs_of
+from workflow.sweep.design import SweepRun, runs_of
 from workflow.sweep.schema import load_sweep
-from workflow.sweep.table import Row, columns_of, unit_of, varied_in
+from workflow.sweep.table import SweepRow, columns_of, unit_of, varied_in
 
 CASES = Path(__file__).parents[2] / "cases"
 PATIENCE = 120.0
@@ -365,27 +365,27 @@ def worn(depth, line=False):
         "seconds": {"a": 1.0},
         "work": {"contact_solves": 7},
     }
-    run = Run(f"run{depth}", {"friction.coefficient": f"{100 * depth:g} %"})
-    return Row(run, Finished(None, Path(), summary))
+    run = SweepRun(f"run{depth}", {"friction.coefficient": f"{100 * depth:g} %"})
+    return SweepRow(run, Finished(None, Path(), summary))
 
 
 def test_columns_of_wear_runs_are_of_both_bodies_and_have_units():
-    rows = [worn(0.1), worn(0.2), Row(worn(0.3).run, Finished(None, Path(), None, "it broke"))]
+    rows = [worn(0.1), worn(0.2), SweepRow(worn(0.3).run, Finished(None, Path(), None, "it broke"))]
     columns = columns_of(rows)
     np.testing.assert_allclose(columns["flank.depth"], [0.3, 0.6, np.nan], rtol=1e-15)
     np.testing.assert_array_equal(columns["flank.peak_pressure.worn"], [200.0, 200.0, np.nan])
     assert columns["work.contact_solves"][0] == 7
     assert unit_of("flank.volume", rows) == "mm^3"
     assert unit_of("flank.volume", [worn(0.1, line=True)]) == "mm^3/mm"
-    run = Run("pressed", {})
+    run = SweepRun("pressed", {})
     pressed = Finished(run, Path("pressed"), {"loop": {"energy": 1.0}})
-    assert unit_of("loop.energy", [Row(run, pressed)]) == ""
+    assert unit_of("loop.energy", [SweepRow(run, pressed)]) == ""
     assert unit_of("flank.energy", [*rows, worn(0.1, line=True)]) == "N mm or N mm/mm"
 
 
 def test_varied_values_share_a_unit_where_they_can():
     def varied(*values):
-        return varied_in([Row(Run("one", {"a.b": value}), None) for value in values])[0]
+        return varied_in([SweepRow(SweepRun("one", {"a.b": value}), None) for value in values])[0]
 
     same = varied("1 mm", "2.5 mm")
     assert (same.heading, same.texts) == ("a.b [mm]", ["1", "2.5"])
@@ -402,7 +402,7 @@ def test_bands_over_the_cycles(tmp_path):
 
     rows = [worn(depth) for depth in (0.1, 0.2, 0.3, 0.4, 0.5)]
     rows[0].finished.summary["kinetics"]["cycles"] = [0.0, 10.0, 20.0]
-    rows.append(Row(worn(0.6).run, Finished(None, Path(), None, "it broke")))
+    rows.append(SweepRow(worn(0.6).run, Finished(None, Path(), None, "it broke")))
     figure = kinetics_bands("Flanks", rows, ["flank"])
     depth, volume = figure.axes
     assert figure.get_suptitle() == "Flanks: 5 runs, median (least to largest) at their end"

@@ -17,7 +17,7 @@ from tests.workflow.time_scenes import (
     run,
 )
 from workflow.analyses.time.figures import ring_down
-from workflow.analyses.time.outcome import Contents
+from workflow.analyses.time.outcome import MotionContents
 from workflow.kinds import template
 
 
@@ -100,7 +100,7 @@ def test_states_without_a_ring_down_are_in_its_figure(tmp_path):
         for name in ("amplitude", "frequency", "damping_ratio"):
             file[f"states/00001/ring_down/{name}"] = 1.0 + time
         groups = {"motion": ("00000", "00001"), "ring_down": ("00001",)}
-        drawn = ring_down(file, Contents(groups, (), aged=False))
+        drawn = ring_down(file, MotionContents(groups, (), aged=False))
     history, softened, damping = drawn.get_axes()
     labels = [line.get_label() for line in history.get_lines()]
     assert labels == ["unworn: stuck 50 Hz, no ring-down", "1 J: stuck 50 Hz"]

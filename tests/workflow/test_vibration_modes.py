@@ -10,7 +10,7 @@ from tests.workflow.figure_checks import problems
 from tests.workflow.test_vibration_case import RIG
 from tests.workflow.time_scenes import refused, run
 from workflow.analyses.vibration.figures.modes import modes as figure
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import VibrationContents
 
 LIGHT = "structure.damping_ratio=0.001"
 ASKED = "modes={numbers: [1, 2], amplitudes: [0.2 um, 20 um]}"
@@ -55,7 +55,7 @@ def test_phase_resonance_lies_on_the_lightly_damped_mode(sliding):
 
 def test_figure_has_a_row_for_each_mode(sliding):
     folder, _ = sliding
-    contents = Contents(("00000", "00001"), (), False, True, modes=("00000", "00001"))
+    contents = VibrationContents(("00000", "00001"), (), False, True, modes=("00000", "00001"))
     with h5py.File(folder / "out" / "results.h5") as file:
         drawn = figure(file, contents)
         drawn.canvas.draw()

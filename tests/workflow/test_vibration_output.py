@@ -20,7 +20,7 @@ from workflow.analyses.vibration import ANALYSIS
 from workflow.analyses.vibration.figures import loops as vibration_loops
 from workflow.analyses.vibration.figures import response as vibration
 from workflow.analyses.vibration.figures import states as vibration_states
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import VibrationContents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.paraview import MOST_STEPS, shown_samples, write_vibration
 from workflow.pictures.drawing import write_figures
@@ -41,7 +41,7 @@ BACKBONE = {
     "energy_per_cycle": "N mm",
     "slip": "1",
 }
-CONTENTS = Contents(
+CONTENTS = VibrationContents(
     ("00000", "00001"), ("00000", "00001"), places=True, backbone=True, joints=ROWS**2
 )
 NAMES = {"frequency_response", "resonance", "loops", "node_shares", "node_states", "pad_states"}
@@ -295,7 +295,7 @@ def test_of_a_folded_curve_the_largest_motion_is_shown() -> None:
 
 
 def test_figures_without_data_are_left_out(changed: h5py.File, tmp_path: Path) -> None:
-    bare = Contents(("00001",), (), places=False, backbone=False)
+    bare = VibrationContents(("00001",), (), places=False, backbone=False)
     assert set(vibration.figures_of(bare)) == {"frequency_response"}
     assert write_vibration(bare, changed, tmp_path / "paraview") == []
 
@@ -409,7 +409,7 @@ def test_case_without_figures_and_paraview_has_none(tmp_path: Path) -> None:
         assert not (out / name).exists()
     with h5py.File(out / "results.h5") as file:
         joints = file["responses/00000/nodes/slip"].shape[1]
-    one = Contents(("00000",), (), places=True, backbone=False, joints=joints)
+    one = VibrationContents(("00000",), (), places=True, backbone=False, joints=joints)
     assert ANALYSIS.pictures is not None
     later = write_figures(ANALYSIS.pictures, one, out / "results.h5", tmp_path / "later")
     states = {"node_shares", "node_states", "pad_states"}

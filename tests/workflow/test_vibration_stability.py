@@ -17,7 +17,7 @@ from tests.workflow.vibration_pad import block
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.periodic.march import PeriodicMarch
 from workflow.analyses.vibration.figures.response import frequency_response
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import VibrationContents
 
 CASE = """
 title: A mass on a spring that hardens
@@ -62,7 +62,7 @@ def test_a_further_branch_is_found_with_its_fold_and_drawn_dashed(tmp_path: Any)
         assert set(codes) == {1, -1}
         assert ((group["multiplier"][()] > 1.0) == (codes == -1)).all()
         assert list(group["bifurcations"].attrs["kind"]) == ["fold"]
-        contents = Contents(("00000", "00001"), (), places=False, backbone=False)
+        contents = VibrationContents(("00000", "00001"), (), places=False, backbone=False)
         axis, _ = frequency_response(file, contents).axes
         dashed = [line for line in axis.lines if line.get_linestyle() == "--"]
         drawn = np.concatenate([line.get_xdata() for line in dashed])

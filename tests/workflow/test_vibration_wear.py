@@ -292,10 +292,10 @@ def test_tables_hold_the_evolution_and_every_response(ended, summary):
 @pytest.mark.slow
 def test_figures_are_drawn(ended, tmp_path):
     from workflow.analyses.vibration_wear import ANALYSIS
-    from workflow.analyses.vibration_wear.outcome import Contents
+    from workflow.analyses.vibration_wear.outcome import VibrationWearContents
     from workflow.pictures.drawing import write_figures
 
-    told = ANALYSIS.pictures, Contents(at_nodes=False), ended / "results.h5"
+    told = ANALYSIS.pictures, VibrationWearContents(at_nodes=False), ended / "results.h5"
     drawn = {path.stem for path in write_figures(*told, tmp_path)}
     assert drawn == {"frequency_response", "evolution", "scar", "loops"}
 

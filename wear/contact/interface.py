@@ -23,7 +23,7 @@ from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, LoadHistory, Mask
 from wear.contact.face_loads import FaceLoads
-from wear.contact.link import Link, linked
+from wear.contact.link import StructureLink, linked
 from wear.contact.moving import followed, passages
 from wear.contact.settings import InterfaceSettings
 from wear.contact.tractions import ContactFields, CycleTractions, acting_slip
@@ -70,7 +70,7 @@ class InterfaceState(WearState):
 
     loads: LoadHistory
     slip: Array
-    link: Link
+    link: StructureLink
     pressed: Array
     paths: Array
 
@@ -109,7 +109,7 @@ class FirstContact:
     largest_residual: float
     spent: Spent
     stable_cycles: float
-    link: Link
+    link: StructureLink
     cycle: tuple[ContactState, ...]
 
 
@@ -224,7 +224,9 @@ class InterfaceContact:
         """
         return self._followed(state, history, self._link(history)), self._newly_spent()
 
-    def _followed(self, state: InterfaceState, history: FaceLoads, link: Link) -> InterfaceState:
+    def _followed(
+        self, state: InterfaceState, history: FaceLoads, link: StructureLink
+    ) -> InterfaceState:
         if isinstance(state.coarse, InterfaceState):
             state = replace(state, coarse=self._followed(state.coarse, history, link))
         starts = {t: start for t, start in state.starts.items() if history.loads.P[t] > 0.0}
@@ -342,11 +344,11 @@ class InterfaceContact:
         return spent
 
     # -- loads -------------------------------------------------------------------------------------
-    def _link(self, history: FaceLoads) -> Link:
+    def _link(self, history: FaceLoads) -> StructureLink:
         """Return the link that corrects the half-space for the structure of the loads."""
         settings, force, displacement = self.settings, history.force, history.displacement
         if settings.link == "half_space" or force is None or displacement is None:
-            return Link.none()
+            return StructureLink.none()
         half_space, shear = self._contact.half_space, settings.method == "full"
         before = half_space.count
         link = linked(half_space, self.transfer, history.loads, force, displacement, shear)

@@ -67,7 +67,7 @@ that of waves eight nodes long is 9.
 
 
 @dataclass(frozen=True)
-class Link:
+class StructureLink:
     """The correction d of every increment, by polynomials.
 
     Without increments a link corrects nothing.
@@ -89,7 +89,7 @@ class Link:
     quality: Array
 
     @classmethod
-    def none(cls) -> Link:
+    def none(cls) -> StructureLink:
         """Return a link that corrects nothing."""
         return cls(np.empty((0, 3, 0, 0)), np.zeros((2, 2)), np.zeros(3))
 
@@ -144,19 +144,19 @@ class Link:
         products = along_x[:, :, None] * along_y[:, None, :]
         return _summed(coefficients, products.reshape(len(along_x), -1), places)
 
-    def without_shift(self) -> Link:
+    def without_shift(self) -> StructureLink:
         """Return the link without the rigid translation of the bodies, whose size is arbitrary."""
         coefficients = self.coefficients.copy()
         coefficients[:, :, :1, :1] = 0.0
         return replace(self, coefficients=coefficients)
 
-    def level(self) -> Link:
+    def level(self) -> StructureLink:
         """Return the link without the tilt of the bodies."""
         coefficients = self.coefficients.copy()
         coefficients[:, 2, 1:2, :1] = coefficients[:, 2, :1, 1:2] = 0.0
         return replace(self, coefficients=coefficients)
 
-    def increment(self, t: int) -> Link:
+    def increment(self, t: int) -> StructureLink:
         """Return the link of increment ``t`` alone."""
         return replace(self, coefficients=self.coefficients[t : t + 1])
 
@@ -175,7 +175,7 @@ def linked(
     force: Array,
     displacement: Array,
     shear: bool,
-) -> Link:
+) -> StructureLink:
     """Return the link of a solved cycle, or no correction if too few nodes are near the contact.
 
     It takes a convolution for each loaded increment.
@@ -201,7 +201,9 @@ def linked(
     return fitted(face, defect, deflection, force[:, 2], first_largest(loads.P)).without_shift()
 
 
-def fitted(face: Transfer, defect: Array, deflection: Array, pressing: Array, peak: int) -> Link:
+def fitted(
+    face: Transfer, defect: Array, deflection: Array, pressing: Array, peak: int
+) -> StructureLink:
     """Return the link of a ``defect`` at the nodes, or no correction if too few nodes are near.
 
     On the two or three nodes of a narrow contact d may be mostly graininess. If the residual is too
@@ -228,20 +230,22 @@ def fitted(face: Transfer, defect: Array, deflection: Array, pressing: Array, pe
     return link
 
 
-def _fit(face: Transfer, defect: Array, deflection: Array, region: Array, peak: int) -> Link:
+def _fit(
+    face: Transfer, defect: Array, deflection: Array, region: Array, peak: int
+) -> StructureLink:
     """Return the link fitted over a region."""
     near = _near(face, region)
     if near.sum() < FEWEST_NODES:
-        return Link.none()
+        return StructureLink.none()
     degrees = _degrees(region, face.spacing(region))
     coefficients, basis = _least_squares(face, defect, region, near, degrees)
     residual = np.zeros(len(near))
     residual[near] = defect[peak, 2, near] - basis @ coefficients[peak, 2].ravel()
     quality = _quality(face, near, defect[peak, 2], deflection[peak, 2], residual)
-    return Link(coefficients, region, quality)
+    return StructureLink(coefficients, region, quality)
 
 
-def fitted_alike(link: Link, face: Transfer, nodal: Array) -> Link:
+def fitted_alike(link: StructureLink, face: Transfer, nodal: Array) -> StructureLink:
     """Fit fields with ``nodal`` values ``(t, 3, n)`` as the given ``link`` was fitted.
 
     The fit has the degrees and the region of that link, and no quality.
@@ -357,7 +361,7 @@ def _derived(coefficients: Array, axis: int, order: int, length: float) -> Array
 
 
 def _quality(face: Transfer, near: Mask, d: Array, deflection: Array, residual: Array) -> Array:
-    """Return the ``quality`` of a :class:`Link` from nodal normal components ``(n,)``."""
+    """Return the ``quality`` of a :class:`StructureLink` from nodal normal components ``(n,)``."""
     plane = np.column_stack([np.ones(near.sum()), face.nodes[near]])
     bent = [
         values[near] - plane @ np.linalg.lstsq(plane, values[near], rcond=None)[0]

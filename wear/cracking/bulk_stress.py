@@ -34,7 +34,7 @@ import numpy as np
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.half_space.subsurface_influence import XX, XY, YY, YZ, ZX
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.contact.link import Link, fitted_alike, linked
+from wear.contact.link import StructureLink, fitted_alike, linked
 from wear.contact.transfer import Transfer
 
 RIGID = Material(np.inf, 0.0)
@@ -65,10 +65,10 @@ class BulkStress:
         [1/mm]. None where no temperature changes.
     """
 
-    rest: Link
+    rest: StructureLink
     material: Material
     body: Literal[1, 2]
-    expansion: Link | None = None
+    expansion: StructureLink | None = None
 
     def increment(self, t: int) -> BulkStress:
         """Return the bulk stress of increment ``t`` alone."""

@@ -130,7 +130,7 @@ class MaterialName(Text):
         return {"enum": list(MATERIALS)}
 
 
-class ElasticBody(Section):
+class ElasticSection(Section):
     """Base of the materials of a case: given by name, by numbers, or both."""
 
     refused: ClassVar[Mapping[str, str]] = {

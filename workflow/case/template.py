@@ -9,12 +9,12 @@ from pydantic.fields import FieldInfo
 
 from workflow.case.sections import (
     KINDS_ARE_NAMED_BY,
-    ElasticBody,
+    ElasticSection,
     Section,
     entries_of,
     sections_of,
 )
-from workflow.case.writing import Row, render
+from workflow.case.writing import EntryRow, render
 
 EDITORS = """\
 # yaml-language-server: $schema=fretscale.schema.json
@@ -53,7 +53,7 @@ def short_template(model: type[Section]) -> str:
     return SHORT_HEADER + render(_needed(model))
 
 
-def _needed(model: type[Section]) -> list[Row]:
+def _needed(model: type[Section]) -> list[EntryRow]:
     """Return the entries of a section that are required, or that its template fills in."""
     filled_in = (*(FILLED_IN if model.filled_in else ()), *model.also_filled_in)
     rows = []
@@ -64,16 +64,16 @@ def _needed(model: type[Section]) -> list[Row]:
             value = _needed(sections[0])
             within = any(row.key not in KINDS_ARE_NAMED_BY for row in value)
             given = given or (within and field.default not in (None, ()))
-            if issubclass(sections[0], ElasticBody):
+            if issubclass(sections[0], ElasticSection):
                 value = MATERIAL
             if get_origin(field.annotation) is tuple:
                 value = [value]
         if given:
-            rows.append(Row(name, value, field.description or ""))
+            rows.append(EntryRow(name, value, field.description or ""))
     return rows
 
 
-def _rows(model: type[Section], shown: set[tuple[type[Section], ...]]) -> list[Row]:
+def _rows(model: type[Section], shown: set[tuple[type[Section], ...]]) -> list[EntryRow]:
     """Return the entries of a section, each followed by its other kinds that are not yet shown."""
     filled_in = (*(FILLED_IN if model.filled_in else ()), *model.also_filled_in)
     rows = []
@@ -96,7 +96,7 @@ def _row(
     field: FieldInfo,
     filled_in: tuple[str, ...],
     shown: set[tuple[type[Section], ...]],
-) -> Row:
+) -> EntryRow:
     """Return the entry as a user would write it; where it has several kinds, the first."""
     sections = list(sections_of(field.annotation))
     value: Any = _rows(sections[0], shown) if sections else (field.examples or [None])[0]
@@ -106,7 +106,7 @@ def _row(
         value, off = [replace(row, off=False) for row in value], True
     if sections and get_origin(field.annotation) is tuple:
         value = [value]
-    return Row(name, value, field.description or "", off)
+    return EntryRow(name, value, field.description or "", off)
 
 
 def _other(
@@ -114,7 +114,7 @@ def _other(
     model: type[Section],
     first: type[Section],
     shown: set[tuple[type[Section], ...]],
-) -> Row:
+) -> EntryRow:
     """Return an entry of another kind than the ``first``, with its kind and its new entries."""
     rows = _rows(model, shown)
     above = {key: field.description for key, field in first.model_fields.items()}
@@ -125,4 +125,4 @@ def _other(
         if row.key not in KINDS_ARE_NAMED_BY and not (row.off and row.key in above)
     ]
     told = (model.__doc__ or "").split("\n")[0].rstrip(".").replace("``", "")
-    return Row(name, [*named, *new], f"or: {told}", off=True)
+    return EntryRow(name, [*named, *new], f"or: {told}", off=True)

@@ -26,7 +26,7 @@ INDENT = "  "
 
 
 @dataclass(frozen=True)
-class Row:
+class EntryRow:
     """Entry to be written; ``off`` writes it as a comment."""
 
     key: str
@@ -40,11 +40,11 @@ def dump_case(case: Case) -> str:
     return HEADER + render(rows_of(case))
 
 
-def rows_of(section: BaseModel) -> list[Row]:
+def rows_of(section: BaseModel) -> list[EntryRow]:
     """Return the entries of ``section`` that are set."""
     fields = entries_of(type(section))
     return [
-        Row(name, _value(getattr(section, name)), field.description or "")
+        EntryRow(name, _value(getattr(section, name)), field.description or "")
         for name, field in fields.items()
         if getattr(section, name) is not None
     ]
@@ -58,29 +58,29 @@ def _value(value: Any) -> Any:
     return value
 
 
-def render(rows: list[Row]) -> str:
+def render(rows: list[EntryRow]) -> str:
     """Return ``rows`` as YAML text, with a blank line before each section."""
     blocks = ["\n".join(_lines([row])) for row in rows]
     spaced = [f"\n{b}" if _is_section(r.value) else b for r, b in zip(rows, blocks, strict=True)]
     return "\n".join(spaced) + "\n"
 
 
-def _lines(rows: list[Row]) -> Iterator[str]:
+def _lines(rows: list[EntryRow]) -> Iterator[str]:
     for row in rows:
         for line in _entry_lines(row):
             yield f"# {line}" if row.off else line
 
 
-def _entry_lines(row: Row) -> Iterator[str]:
+def _entry_lines(row: EntryRow) -> Iterator[str]:
     if not _is_section(row.value):
         yield _commented(f"{row.key}: {scalar(row.value)}", row.comment)
         return
     yield _commented(f"{row.key}:", row.comment)
-    if isinstance(row.value[0], Row):
+    if isinstance(row.value[0], EntryRow):
         yield from (INDENT + line for line in _lines(row.value))
         return
     for item in row.value:
-        other = isinstance(item, Row)  # an item of another kind, written as a comment
+        other = isinstance(item, EntryRow)  # an item of another kind, written as a comment
         first, *rest = _lines(item.value if other else item)
         sign = "# " if other else ""
         yield _commented(f"{INDENT}{sign}- {first}", item.comment if other else "")
@@ -91,7 +91,7 @@ def _is_section(value: Any) -> bool:
     """Return whether ``value`` is rows, or a list of sections given as rows."""
     if not isinstance(value, list) or not value:
         return False
-    return isinstance(value[0], Row) or _is_section(value[0])
+    return isinstance(value[0], EntryRow) or _is_section(value[0])
 
 
 def _commented(text: str, comment: str) -> str:

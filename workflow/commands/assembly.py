@@ -22,7 +22,7 @@ TRIANGLE, LINE = 5, 3  # cell types of VTK
 
 
 @dataclass(frozen=True)
-class Shown:
+class DrawnBody:
     """Body as it is drawn: its surface, and what the file names on it.
 
     ``corners`` ``(m, dim, 3)`` [mm] are the corners of the facets of its surface, ``normals``
@@ -45,19 +45,19 @@ class Shown:
         return np.asarray(np.ptp(self.corners.reshape(-1, 3), axis=0))
 
 
-def shown_bodies(imported: ImportedMesh) -> list[Shown]:
+def shown_bodies(imported: ImportedMesh) -> list[DrawnBody]:
     """Return all bodies of a file."""
     return [_shown(imported, name) for name in imported.bodies]
 
 
-def _shown(imported: ImportedMesh, name: str) -> Shown:
+def _shown(imported: ImportedMesh, name: str) -> DrawnBody:
     body = imported.bodies[name]
     facets = np.asarray(body.mesh.boundary_facets())
     surface = Body(name, body.mesh.with_boundaries({SURFACE: facets}))
     row = np.full(body.mesh.facets.shape[1], -1)
     row[facets] = np.arange(len(facets))
     named = {**(body.mesh.boundaries or {}), **imported.set_faces[name]}
-    return Shown(
+    return DrawnBody(
         name=name,
         body=body,
         corners=body.points[surface.facets(SURFACE)],
@@ -110,7 +110,7 @@ def grid_of(imported: ImportedMesh) -> pyvista.UnstructuredGrid:
     return grid
 
 
-def _cells(shown: Shown, offset: int) -> tuple[Indices, Indices, Indices]:
+def _cells(shown: DrawnBody, offset: int) -> tuple[Indices, Indices, Indices]:
     """Return the cells of a body in VTK's format, their types, and their rows in its surface.
 
     Elements, which only plane bodies list, have the row -1.

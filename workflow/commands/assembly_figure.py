@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sa_solver.types import Array
-from workflow.commands.assembly import Shown
+from workflow.commands.assembly import DrawnBody
 from workflow.pictures.panels import new_figure
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, write_figures
 
@@ -33,12 +33,12 @@ PANEL_HEIGHT, LEGEND_LINES, LINE_HEIGHT = 3.6, 14, 0.26
 MOST_FACES, MOST_BODIES = 18, 12
 
 
-def write_figure(bodies: Sequence[Shown], title: str, path: Path) -> None:
+def write_figure(bodies: Sequence[DrawnBody], title: str, path: Path) -> None:
     """Draw the bodies of the file ``title``."""
     write_figures([(path.stem, partial(figure, bodies, title))], path.parent)
 
 
-def figure(bodies: Sequence[Shown], title: str) -> Figure:
+def figure(bodies: Sequence[DrawnBody], title: str) -> Figure:
     """Draw all bodies together, then each alone, from two sides; plane bodies from one."""
     plane = bodies[0].corners.shape[1] == 2
     shown = list(bodies[:MOST_BODIES])
@@ -58,13 +58,13 @@ def _counted(count: int) -> str:
     return "1 body" if count == 1 else f"{count} bodies"
 
 
-def _height(body: Shown) -> float:
+def _height(body: DrawnBody) -> float:
     """Return the height of a row [inches]: its legend may be higher than its panels."""
     lines = len(_entries(body))
     return PANEL_HEIGHT + max(0, lines - LEGEND_LINES) * LINE_HEIGHT
 
 
-def _entries(body: Shown) -> list[str]:
+def _entries(body: DrawnBody) -> list[str]:
     """Return the lines of the legend of a body."""
     faces = [f"{n} {name}" for n, name in enumerate(body.faces, 1)]
     over = len(faces) - MOST_FACES
@@ -72,7 +72,7 @@ def _entries(body: Shown) -> list[str]:
     return [*faces[:MOST_FACES], *left, *(f"• {name}" for name in body.points)]
 
 
-def _draw_assembly(part: Any, bodies: Sequence[Shown], plane: bool) -> None:
+def _draw_assembly(part: Any, bodies: Sequence[DrawnBody], plane: bool) -> None:
     colours = [_colour(number) for number in range(len(bodies))]
     corners = np.concatenate([body.corners for body in bodies])
     normals = np.concatenate([body.normals for body in bodies])
@@ -90,7 +90,7 @@ def _draw_assembly(part: Any, bodies: Sequence[Shown], plane: bool) -> None:
     axes[-1].legend(handles=named[:MOST_FACES], loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _draw_body(part: Any, body: Shown, plane: bool) -> None:
+def _draw_body(part: Any, body: DrawnBody, plane: bool) -> None:
     size = " x ".join(f"{v:.4g}" for v in body.extent[[0, 2] if plane else slice(None)])
     part.suptitle(f"{body.name}, {size} mm", x=0.01, ha="left", fontsize=13)
     fill = np.tile(to_rgb(GREY), (len(body.corners), 1))
@@ -183,7 +183,7 @@ def _draw_triad(axis: Axes, screen: Array) -> None:
         )
 
 
-def _fill_plane(axis: Axes, body: Shown, colour: Any) -> None:
+def _fill_plane(axis: Axes, body: DrawnBody, colour: Any) -> None:
     """Draw all elements of a plane body."""
     places = body.body.points[:, [0, 2]]
     triangles = list(places[body.body.mesh.t.T])
@@ -199,7 +199,7 @@ def _fill_plane(axis: Axes, body: Shown, colour: Any) -> None:
     axis.set_ylabel("z [mm]")
 
 
-def _number_faces(axis: Axes, body: Shown, screen: Array, eye: Array | None) -> None:
+def _number_faces(axis: Axes, body: DrawnBody, screen: Array, eye: Array | None) -> None:
     """Write the number of each face in the middle of its visible part; equal places share one."""
     labels: dict[int, list[str]] = {}
     middles = body.corners.mean(axis=1)
@@ -222,7 +222,7 @@ def _number_faces(axis: Axes, body: Shown, screen: Array, eye: Array | None) -> 
         )
 
 
-def _mark_points(axis: Axes, body: Shown, screen: Array) -> None:
+def _mark_points(axis: Axes, body: DrawnBody, screen: Array) -> None:
     """Draw the node sets that are not faces, as dots."""
     for places in body.points.values():
         axis.plot(*(places @ screen.T).T, ".", color=BLACK, ms=4.0)

@@ -1,5 +1,5 @@
 """Comparison of finished runs: their main results, differences of their cases, and curves."""
 
-from workflow.comparing.compared import Comparison, compare
+from workflow.comparing.compared import ComparedRuns, compare
 
-__all__ = ["Comparison", "compare"]
+__all__ = ["ComparedRuns", "compare"]

@@ -16,7 +16,7 @@ from workflow.kinds import analysis_of
 from workflow.report.told import ToldRun
 from workflow.report.writing import told_run
 from workflow.shell.analysis import Analysis
-from workflow.shell.quantities import Quantity
+from workflow.shell.quantities import SummaryQuantity
 from workflow.shell.summary import required_number
 
 # Entries of a case that no result depends on.
@@ -34,17 +34,17 @@ class ComparedRun:
 
 
 @dataclass(frozen=True)
-class Row:
+class ComparedQuantity:
     """Quantity in every run with its value, None where a run has none.
 
     All values have the same base unit. The first run is the reference for the others.
     """
 
-    quantities: tuple[Quantity | None, ...]
+    quantities: tuple[SummaryQuantity | None, ...]
     values: tuple[float | None, ...]
 
     @property
-    def first(self) -> Quantity:
+    def first(self) -> SummaryQuantity:
         return next(quantity for quantity in self.quantities if quantity is not None)
 
     @property
@@ -77,7 +77,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ComparedRuns:
     """Runs of one analysis, their main results, and entries in which their cases differ.
 
     ``entries`` are texts, one for every run, by dotted path.
@@ -85,7 +85,7 @@ class Comparison:
 
     analysis: Analysis[Any]
     runs: tuple[ComparedRun, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[ComparedQuantity, ...]
     entries: Mapping[str, tuple[str, ...]]
 
     @property
@@ -93,7 +93,7 @@ class Comparison:
         return [run.name for run in self.runs]
 
 
-def compare(folders: Sequence[str | Path]) -> Comparison:
+def compare(folders: Sequence[str | Path]) -> ComparedRuns:
     """Compare the finished runs in two or more folders, all of one analysis.
 
     Raises UserError for folders without a finished run, changed results, and other analyses.
@@ -111,7 +111,7 @@ def compare(folders: Sequence[str | Path]) -> Comparison:
                 f"{run.folder}: a run of a {run.run.kind} case, where that in {paths[0]} is of a "
                 f"{first.kind} case; allowed: {', '.join(analysis.cases)}"
             )
-    return Comparison(analysis, runs, _rows(analysis, told), _entries(told))
+    return ComparedRuns(analysis, runs, _rows(analysis, told), _entries(told))
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -123,7 +123,7 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [path.relative_to(above).as_posix() for path in whole]
 
 
-def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[Row, ...]:
+def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[ComparedQuantity, ...]:
     """Return quantities of all runs by group, name and unit, in the order of the first run.
 
     In a line contact and in one over an area, a name may have different units, and so two rows.
@@ -142,7 +142,7 @@ def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[Row, ...]:
             None if quantity is None else required_number(run.summary, quantity.path)
             for quantity, run in zip(quantities, runs, strict=True)
         )
-        rows.append(Row(quantities, values))
+        rows.append(ComparedQuantity(quantities, values))
     return tuple(rows)
 
 

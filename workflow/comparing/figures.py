@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from sa_solver.types import Array
 from workflow.case.readable import suited
 from workflow.case.typeset import minus
-from workflow.comparing.compared import Comparison
+from workflow.comparing.compared import ComparedRuns
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
 from workflow.shell.curves import Curve, curves_in
 from workflow.shell.folder import OutputFolder
@@ -29,7 +29,7 @@ Curves = dict[str, dict[str, Curve]]
 """Curves by title and name of the run."""
 
 
-def figures_of(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
+def figures_of(comparison: ComparedRuns) -> dict[str, Callable[[], Figure]]:
     """Return a drawing function for each title of curves that two runs or more have in common.
 
     Curves of one title must have the same units.

@@ -17,7 +17,7 @@ from rich.table import Column, Table
 from workflow.case.readable import percent, readable
 from workflow.case.typeset import given
 from workflow.case.typeset import number as printed
-from workflow.comparing.compared import NOTHING, Comparison, Row
+from workflow.comparing.compared import NOTHING, ComparedQuantity, ComparedRuns
 from workflow.report.numbers import value_of
 from workflow.report.page import (
     Html,
@@ -44,7 +44,7 @@ LARGE, FACTOR_DIGITS = 5.0, 0.05
 FILE_WIDTH = 140
 
 
-def show(comparison: Comparison) -> None:
+def show(comparison: ComparedRuns) -> None:
     """Print the differences of the cases and all quantities on the terminal."""
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
@@ -52,7 +52,7 @@ def show(comparison: Comparison) -> None:
     _print(comparison, console)
 
 
-def text_of(comparison: Comparison) -> str:
+def text_of(comparison: ComparedRuns) -> str:
     """Return the comparison as text."""
     console = Console(file=StringIO(), width=FILE_WIDTH, highlight=False, markup=False)
     with console.capture() as printed:
@@ -60,7 +60,7 @@ def text_of(comparison: Comparison) -> str:
     return "\n".join(line.rstrip() for line in printed.get().splitlines())
 
 
-def _print(comparison: Comparison, console: Console) -> None:
+def _print(comparison: ComparedRuns, console: Console) -> None:
     if comparison.entries:
         entries = Table(Column("case"), *comparison.names, box=SIMPLE)
         for path, texts in comparison.entries.items():
@@ -80,7 +80,7 @@ def _print(comparison: Comparison, console: Console) -> None:
     console.print(MEANING)
 
 
-def _text(row: Row, number: int) -> str:
+def _text(row: ComparedQuantity, number: int) -> str:
     """Return a value, and its difference from that of the first run."""
     quantity, value = row.quantities[number], row.values[number]
     if quantity is None or value is None:
@@ -89,7 +89,7 @@ def _text(row: Row, number: int) -> str:
     return " ".join([shown, *_apart(row, number)])
 
 
-def _apart(row: Row, number: int) -> Iterator[str]:
+def _apart(row: ComparedQuantity, number: int) -> Iterator[str]:
     difference = row.difference(number)
     if difference is not None:
         yield f"({_signed(difference)})"
@@ -111,12 +111,12 @@ def _signed(difference: float) -> str:
 # --- table --------------------------------------------------------------------------------------
 
 
-def write_csv(comparison: Comparison, path: Path) -> None:
+def write_csv(comparison: ComparedRuns, path: Path) -> None:
     """Write the table of all quantities."""
     write_table(path, columns_of(comparison))
 
 
-def columns_of(comparison: Comparison) -> dict[str, list[Any]]:
+def columns_of(comparison: ComparedRuns) -> dict[str, list[Any]]:
     """Return all quantities in base units; estimated errors and differences are relative."""
     rows, names = comparison.rows, comparison.names
     columns: dict[str, list[Any]] = {
@@ -137,7 +137,7 @@ def columns_of(comparison: Comparison) -> dict[str, list[Any]]:
 # --- page ---------------------------------------------------------------------------------------
 
 
-def comparison_page(comparison: Comparison, figures: dict[str, str]) -> str:
+def comparison_page(comparison: ComparedRuns, figures: dict[str, str]) -> str:
     """Return the whole page; ``figures`` are SVG texts by their titles."""
     names = comparison.names
     pictures = [picture(svg, title, captioned=False) for title, svg in figures.items()]
@@ -158,7 +158,7 @@ def comparison_page(comparison: Comparison, figures: dict[str, str]) -> str:
     return page(title, header, *parts)
 
 
-def _runs(comparison: Comparison) -> Html:
+def _runs(comparison: ComparedRuns) -> Html:
     rows = []
     for run in comparison.runs:
         warnings = len(run.run.summary["warnings"])
@@ -169,14 +169,14 @@ def _runs(comparison: Comparison) -> Html:
     return table(head, rows, numbers=(3, 4), stacks=True)
 
 
-def _entries(comparison: Comparison) -> Html:
+def _entries(comparison: ComparedRuns) -> Html:
     if not comparison.entries:
         return element("p", "Nothing that results depend on.")
     rows = [[code(path), *map(given, texts)] for path, texts in comparison.entries.items()]
     return table(["", *comparison.names], rows)
 
 
-def _results(comparison: Comparison) -> Html:
+def _results(comparison: ComparedRuns) -> Html:
     runs = range(len(comparison.runs))
     rows: list[list[object]] = []
     for group, those in groupby(comparison.rows, lambda row: row.first.group):
@@ -185,7 +185,7 @@ def _results(comparison: Comparison) -> Html:
     return table(["", *comparison.names], rows, numbers=range(1, len(comparison.runs) + 1))
 
 
-def _cell(row: Row, number: int) -> object:
+def _cell(row: ComparedQuantity, number: int) -> object:
     quantity, value = row.quantities[number], row.values[number]
     if quantity is None or value is None:
         return NOTHING

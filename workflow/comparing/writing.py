@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from workflow.comparing.compared import Comparison
+from workflow.comparing.compared import ComparedRuns
 from workflow.comparing.showing import comparison_page, write_csv
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked
@@ -14,7 +14,7 @@ from workflow.shell.store import write_text
 TABLE, PAGE, FIGURES = "compare.csv", "compare.html", "curves"
 
 
-def write_comparison(comparison: Comparison, out: Path, force: bool = False) -> list[Path]:
+def write_comparison(comparison: ComparedRuns, out: Path, force: bool = False) -> list[Path]:
     """Write ``compare.csv``, ``compare.html`` and figures; return the paths of the first two.
 
     Raises UserError for a folder that has them already, unless ``force``, or that fretscale did not

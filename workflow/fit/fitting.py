@@ -29,7 +29,7 @@ from wear.fitting.diagnosis import ALARM
 from workflow.case.sections import Section
 from workflow.case.units import to_base
 from workflow.errors import CaseError, UserError
-from workflow.fit.measured import Column, read_columns
+from workflow.fit.measured import MeasuredColumn, read_columns
 from workflow.fit.schema import FREE, FitInput, JointFit, WearFit
 from workflow.pictures.scales import TO_JOULES, TO_MICRONS
 
@@ -79,7 +79,7 @@ class Parameter:
         return number / (1.0 if self.unit == "1" else to_base(f"1 {self.unit}", None))
 
 
-class Along(NamedTuple):
+class FitAxis(NamedTuple):
     """Quantity along which values were measured: name, base unit, display factor and unit."""
 
     name: str
@@ -88,8 +88,8 @@ class Along(NamedTuple):
     unit: str
 
 
-ENERGY = Along("dissipated energy", "N*mm", TO_JOULES, "J")
-DISPLACEMENT = Along("displacement", "mm", TO_MICRONS, "µm")
+ENERGY = FitAxis("dissipated energy", "N*mm", TO_JOULES, "J")
+DISPLACEMENT = FitAxis("displacement", "mm", TO_MICRONS, "µm")
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,8 @@ class FittedSeries:
 
     name: str
     unit: str
-    column: Column
-    along: Along
+    column: MeasuredColumn
+    along: FitAxis
     curve: Callable[[Array], Callable[[Array], Array]] | None
 
     @property
@@ -301,7 +301,9 @@ def fit_joint(given: FitInput, file: JointFit) -> Fitted:
     return solved(given, fitted, paths, series, notes)
 
 
-def _evolution_data(file: JointFit, name: str, section: Section, column: Column) -> EvolutionData:
+def _evolution_data(
+    file: JointFit, name: str, section: Section, column: MeasuredColumn
+) -> EvolutionData:
     """Return the data of a parameter of the joint, and the fixed entries of its function."""
     entries = {INITIAL: getattr(file.joint, name), **section.model_dump(exclude={"kind"})}
     held = {key: float(value) for key, value in entries.items() if value != FREE}
@@ -325,8 +327,8 @@ def _joint_path(name: str) -> tuple[str, str]:
 
 
 def _without_residual(
-    file: JointFit, columns: dict[str, Column]
-) -> tuple[dict[str, Column], list[str]]:
+    file: JointFit, columns: dict[str, MeasuredColumn]
+) -> tuple[dict[str, MeasuredColumn], list[str]]:
     """Return the columns with the stiffness as the law defines it, and notes about it."""
     if file.law == "bouc_wen" or "kt" not in columns:
         return columns, []
@@ -338,7 +340,9 @@ def _without_residual(
             "as it is: right where nothing of it is left when all slides"
         )
         return columns, [note]
-    alone = Column(kt.against, kt.values - residual, kt.deviations, kt.others, kt.places, kt.files)
+    alone = MeasuredColumn(
+        kt.against, kt.values - residual, kt.deviations, kt.others, kt.places, kt.files
+    )
     return {**columns, "kt": alone}, []
 
 

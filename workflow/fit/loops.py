@@ -15,12 +15,12 @@ from wear.joints.measured.measured_loops import ALIKE, MeasuredLoops, measure_lo
 from workflow.case.loop_file import account, read_loop_file
 from workflow.errors import UserError
 from workflow.fit.fitting import DISPLACEMENT, JOINT_UNITS, Fitted, FittedSeries, solved
-from workflow.fit.measured import Column
-from workflow.fit.schema import FREE, FitInput, LoopFit, LoopMeasurement
+from workflow.fit.measured import MeasuredColumn
+from workflow.fit.schema import FREE, FitInput, LoopFitSection, LoopMeasurement
 from workflow.pictures.scales import TO_MICRONS
 
 
-def fit_loops(given: FitInput, file: LoopFit) -> Fitted:
+def fit_loops(given: FitInput, file: LoopFitSection) -> Fitted:
     """Fit a joint law to loops; raise as :func:`workflow.fit.running.run_fit`."""
     entries = file.joint.model_dump(exclude={"law"})
     # NaN stands for the normal load of each record.
@@ -99,11 +99,11 @@ def _doubts(measured: MeasuredLoops, fitted: int) -> list[str]:
     return doubts
 
 
-def _loop_name(file: LoopFit, number: int) -> str:
+def _loop_name(file: LoopFitSection, number: int) -> str:
     return "force" if len(file.measurements) == 1 else f"force_{number}"
 
 
-def _loop_column(loops: Sequence[LoopData], file: str, number: int) -> Column:
+def _loop_column(loops: Sequence[LoopData], file: str, number: int) -> MeasuredColumn:
     """Return the loops of a record as a column, with places named by stroke and displacement."""
     name = Path(file).name
     places = tuple(
@@ -117,7 +117,7 @@ def _loop_column(loops: Sequence[LoopData], file: str, number: int) -> Column:
     )
     force = np.concatenate([loop.force for loop in loops])
     files = np.full(len(force), number)
-    return Column(motion, force, None, {"normal_load": loads}, places, files)
+    return MeasuredColumn(motion, force, None, {"normal_load": loads}, places, files)
 
 
 def _loop_path(name: str) -> tuple[str, str]:

@@ -52,7 +52,7 @@ QUANTITIES = {
 
 
 @dataclass(frozen=True)
-class Column:
+class MeasuredColumn:
     """Values of one kind from all files that have them, in base units.
 
     ``against`` ``(n,)`` is the abscissa of the ``values`` ``(n,)``; ``deviations`` ``(n,)`` is None
@@ -72,7 +72,7 @@ class Column:
 
 @dataclass(frozen=True)
 class _Part:
-    """Values of one kind from one file, with the fields of :class:`Column`."""
+    """Values of one kind from one file, with the fields of :class:`MeasuredColumn`."""
 
     against: Array
     values: Array
@@ -88,7 +88,7 @@ def read_columns(
     beside: Sequence[str] = (),
     ascending: bool = False,
     along: str = ENERGY,
-) -> dict[str, Column]:
+) -> dict[str, MeasuredColumn]:
     """Return the columns of ``names`` that the files have, with the columns ``beside`` if present.
 
     Values were measured ``along`` another column, by which the rows of a file must be sorted if
@@ -224,7 +224,7 @@ def _deviations(
     return table.column(heading, quantity)
 
 
-def _joined(name: str, parts: Sequence[tuple[int, _Part]]) -> Column:
+def _joined(name: str, parts: Sequence[tuple[int, _Part]]) -> MeasuredColumn:
     """Return the columns of all files as one."""
     known = [part.deviations for _, part in parts if part.deviations is not None]
     if known and len(known) < len(parts):
@@ -234,7 +234,7 @@ def _joined(name: str, parts: Sequence[tuple[int, _Part]]) -> Column:
             "files have; allowed: deviations of all, or of none"
         )
     others = set.intersection(*(set(part.others) for _, part in parts))
-    return Column(
+    return MeasuredColumn(
         against=np.concatenate([part.against for _, part in parts]),
         values=np.concatenate([part.values for _, part in parts]),
         deviations=np.concatenate(known) if known else None,

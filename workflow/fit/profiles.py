@@ -22,8 +22,8 @@ from wear.fitting.scars import HEIGHT, SHIFT, THRESHOLD, ScarFit
 from workflow.case.plain import counted
 from workflow.case.writing import scalar
 from workflow.errors import CaseError, UserError
-from workflow.fit.fitting import UNITS, Along, Fitted, FittedSeries, solved
-from workflow.fit.measured import PLACE, Column, read_columns
+from workflow.fit.fitting import UNITS, FitAxis, Fitted, FittedSeries, solved
+from workflow.fit.measured import PLACE, MeasuredColumn, read_columns
 from workflow.fit.profile_runs import Pair, RunScar, TestRuns, rounded
 from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.schema import FitInput
@@ -34,7 +34,7 @@ from workflow.shell.screen import Loudness
 
 BOTH = "both"
 BODIES = {"depth": BOTH, "depth_1": "body_1", "depth_2": "body_2"}
-ALONG = Along("position", "mm", 1.0, "mm")
+ALONG = FitAxis("position", "mm", 1.0, "mm")
 RUNS, LOG = "runs", "fit.log"
 # Largest acceptable error due to too few runs, relative to the standard deviation or to the value,
 # and the largest number of rounds.
@@ -50,7 +50,7 @@ class _Profile:
     name: str
     test: int
     body: str
-    column: Column
+    column: MeasuredColumn
 
 
 def fit_profiles(given: FitInput, file: ProfileFit, out: Path | None, loudness: Loudness) -> Fitted:

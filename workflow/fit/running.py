@@ -9,7 +9,7 @@ from workflow.fit.fitting import Fitted, fit_joint, fit_wear
 from workflow.fit.loops import fit_loops
 from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.report import data_columns, parameter_columns, summary
-from workflow.fit.schema import FitInput, JointFit, LoopFit
+from workflow.fit.schema import FitInput, JointFit, LoopFitSection
 from workflow.fit.section import section_of
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked
@@ -50,7 +50,7 @@ def run_fit(
         return fit_profiles(given, file, out, loudness)
     if isinstance(file, JointFit):
         return fit_joint(given, file)
-    return fit_loops(given, file) if isinstance(file, LoopFit) else fit_wear(given, file)
+    return fit_loops(given, file) if isinstance(file, LoopFitSection) else fit_wear(given, file)
 
 
 def write_fit(fitted: Fitted, out: Path, force: bool = False) -> list[Path]:

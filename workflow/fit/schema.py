@@ -375,7 +375,7 @@ class FreeFourParameterIwan(FreeJoint):
     )
 
 
-class LoopFit(Section):
+class LoopFitSection(Section):
     """Joint law from measured hysteresis loops."""
 
     title: Title = entry("one line", "Joint of the friction rig, as new")
@@ -389,10 +389,10 @@ class LoopFit(Section):
     ] = entry("the law")
 
 
-AnyFile = JointFit | LoopFit | WearFit | ProfileFit
+AnyFile = JointFit | LoopFitSection | WearFit | ProfileFit
 KINDS: Mapping[str, type[AnyFile]] = {
     "joint_evolution": JointFit,
-    "joint_law": LoopFit,
+    "joint_law": LoopFitSection,
     "wear_coefficient": WearFit,
     "wear_profiles": ProfileFit,
 }

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from workflow.case.sections import Section
-from workflow.case.writing import Row, render
+from workflow.case.writing import EntryRow, render
 from workflow.fit.fitting import JOINT_UNITS, UNITS, Fitted, Parameter
 from workflow.fit.profile_schema import ProfileFit
-from workflow.fit.schema import FREE, JointFit, LoopFit, WearFit
+from workflow.fit.schema import FREE, JointFit, LoopFitSection, WearFit
 from workflow.kinds import load_case
 
 # Digits of a deviation; the value ends with the same digit. MOST_DIGITS limits other numbers.
@@ -81,43 +81,43 @@ def section_of(fitted: Fitted) -> str:
     return f"# {file.title}\n{render(rows).lstrip()}"
 
 
-def _row(fitted: Fitted, path: str, key: str) -> Row:
+def _row(fitted: Fitted, path: str, key: str) -> EntryRow:
     """Return the entry of a free parameter."""
     parameter = fitted.by_path[path]
     if not parameter.estimate.determined:
-        return Row(key, LEFT_OUT, parameter.estimate.doubt, off=True)
+        return EntryRow(key, LEFT_OUT, parameter.estimate.doubt, off=True)
     _, _, bounds = told(parameter)
     deviation = parameter.shown(parameter.estimate.deviation)
     value = rounded(parameter.shown(parameter.estimate.value), deviation, IN_SECTION)
-    return Row(key, quantity(value, parameter.unit), f"{BOUNDS}{bounds}")
+    return EntryRow(key, quantity(value, parameter.unit), f"{BOUNDS}{bounds}")
 
 
-def _held(value: float | str, unit: str, key: str) -> Row:
+def _held(value: float | str, unit: str, key: str) -> EntryRow:
     """Return the entry of a parameter that was held at a ``value`` in base units."""
     if isinstance(value, str):
-        return Row(key, value)
+        return EntryRow(key, value)
     number = value if unit == "1" else Parameter("", unit, None).shown(value)  # type: ignore[arg-type]
-    return Row(key, quantity(number_text(number, MOST_DIGITS), unit), "held")
+    return EntryRow(key, quantity(number_text(number, MOST_DIGITS), unit), "held")
 
 
-def _joint(fitted: Fitted, file: JointFit) -> list[Row]:
-    joint = [Row("law", file.law)]
+def _joint(fitted: Fitted, file: JointFit) -> list[EntryRow]:
+    joint = [EntryRow("law", file.law)]
     for name, unit in JOINT_UNITS.items():
         if f"joint.{name}" in fitted.by_path:
             joint.append(_row(fitted, f"joint.{name}", name))
         elif (value := getattr(file.joint, name)) != FREE:
             joint.append(_held(value, unit, name))
         else:
-            joint.append(Row(name, LEFT_OUT, "not measured here", off=True))
+            joint.append(EntryRow(name, LEFT_OUT, "not measured here", off=True))
     evolution = [
-        Row(name, _function(fitted, name, section))
+        EntryRow(name, _function(fitted, name, section))
         for name, section in file.evolution.given.items()
     ]
-    return [Row("joint", joint), Row("evolution", evolution)]
+    return [EntryRow("joint", joint), EntryRow("evolution", evolution)]
 
 
-def _law(fitted: Fitted, file: LoopFit) -> list[Row]:
-    rows = [Row("law", file.joint.law)]
+def _law(fitted: Fitted, file: LoopFitSection) -> list[EntryRow]:
+    rows = [EntryRow("law", file.joint.law)]
     for name, value in file.joint.model_dump(exclude={"law"}).items():
         unit = JOINT_UNITS.get(name, "1")
         if value == FREE:
@@ -127,11 +127,11 @@ def _law(fitted: Fitted, file: LoopFit) -> list[Row]:
         else:
             loads = [float(series.column.others[name].mean()) for series in fitted.series]
             row = _held(sum(loads) / len(loads), unit, name)
-            rows.append(Row(name, row.value, "measured, the mean"))
-    return [Row("joint", rows)]
+            rows.append(EntryRow(name, row.value, "measured, the mean"))
+    return [EntryRow("joint", rows)]
 
 
-def _function(fitted: Fitted, name: str, section: Section) -> list[Row]:
+def _function(fitted: Fitted, name: str, section: Section) -> list[EntryRow]:
     """Return the entries of a function of the energy."""
     rows = []
     for key, value in section.model_dump().items():
@@ -152,7 +152,7 @@ def entries_of(fitted: Fitted, path: str) -> list[str]:
         if path.startswith("wear.both.") or name not in ("coefficient", "threshold"):
             return []
         return [path.replace(".threshold", ".evolution.threshold")]
-    if isinstance(file, LoopFit) or path != f"evolution.{name}":
+    if isinstance(file, LoopFitSection) or path != f"evolution.{name}":
         return [path]
     return [
         f"evolution.{of}.{name}"
@@ -162,17 +162,17 @@ def entries_of(fitted: Fitted, path: str) -> list[str]:
     ]
 
 
-def _wear(fitted: Fitted, file: WearFit) -> list[Row]:
-    rows = [Row("law", "energy" if file.wear.law == "energy" else "energy_amplitude")]
+def _wear(fitted: Fitted, file: WearFit) -> list[EntryRow]:
+    rows = [EntryRow("law", "energy" if file.wear.law == "energy" else "energy_amplitude")]
     if file.wear.reference_amplitude is not None:
         rows.append(_held(file.wear.reference_amplitude, "um", "reference_amplitude"))
     if "wear.exponent" in fitted.by_path:
         found = _row(fitted, "wear.exponent", "exponent")
         comment = f"{found.comment}; energy_amplitude has 1, energy 0"
-        rows.append(Row("exponent", found.value, comment, off=True))
+        rows.append(EntryRow("exponent", found.value, comment, off=True))
     for body in _bodies(fitted):
         rows += _body(fitted, body)
-    return [Row("wear", rows)]
+    return [EntryRow("wear", rows)]
 
 
 def _bodies(fitted: Fitted) -> list[str]:
@@ -180,10 +180,10 @@ def _bodies(fitted: Fitted) -> list[str]:
     return [name for name in names if f"wear.{name}.coefficient" in fitted.by_path]
 
 
-def _profiles(fitted: Fitted, file: ProfileFit) -> list[Row]:
+def _profiles(fitted: Fitted, file: ProfileFit) -> list[EntryRow]:
     """Return the section of wear, with fixed values from the case of the first test."""
     wear: Any = load_case(Path(file.measurements[0].case)).wear  # type: ignore[attr-defined]
-    rows, bodies = [Row("law", wear.law)], _bodies(fitted)
+    rows, bodies = [EntryRow("law", wear.law)], _bodies(fitted)
     if wear.reference_amplitude is not None:
         rows.append(_held(wear.reference_amplitude, "um", "reference_amplitude"))
     for body in bodies if bodies == ["both"] else ("body_1", "body_2"):
@@ -191,36 +191,36 @@ def _profiles(fitted: Fitted, file: ProfileFit) -> list[Row]:
             rows += _body(fitted, body)
         else:
             held = _held(getattr(wear, body).coefficient, "um^3/J", "coefficient")
-            rows.append(Row(body, [held, *_threshold(fitted, body)]))
-    return [Row("wear", rows)]
+            rows.append(EntryRow(body, [held, *_threshold(fitted, body)]))
+    return [EntryRow("wear", rows)]
 
 
-def _threshold(fitted: Fitted, body: str) -> list[Row]:
+def _threshold(fitted: Fitted, body: str) -> list[EntryRow]:
     """Return the evolution of a body if the fit has a threshold, its own or a common one."""
     own = f"wear.{body}.threshold"
     path = own if own in fitted.by_path else "wear.threshold"
     if path not in fitted.by_path:
         return []
     threshold = _row(fitted, path, "threshold")
-    return [Row("evolution", [Row("scope", "global"), threshold], off=threshold.off)]
+    return [EntryRow("evolution", [EntryRow("scope", "global"), threshold], off=threshold.off)]
 
 
-def _body(fitted: Fitted, body: str) -> list[Row]:
+def _body(fitted: Fitted, body: str) -> list[EntryRow]:
     """Return the entries of a body; the shares of both bodies together are left to the user."""
     entries = [_row(fitted, f"wear.{body}.coefficient", "coefficient")]
     entries += _threshold(fitted, body)
     if (path := f"wear.{body}.intercept") in fitted.by_path:
         found = _row(fitted, path, "intercept")
         comment = f"{found.comment}; a case has none: its volumes are less by so much"
-        entries.append(Row("intercept", found.value, comment, off=True))
+        entries.append(EntryRow("intercept", found.value, comment, off=True))
     if body != "both":
-        return [Row(body, entries)]
+        return [EntryRow(body, entries)]
     total = entries[0]
     known = f"{total.value}, {total.comment}" if not total.off else total.comment
-    share = Row("coefficient", LEFT_OUT, f"its share of what both have: {known}")
+    share = EntryRow("coefficient", LEFT_OUT, f"its share of what both have: {known}")
     evolution = [entry for entry in entries if entry.key == "evolution"]
-    others = [Row("coefficient", LEFT_OUT, "the rest"), *evolution]
+    others = [EntryRow("coefficient", LEFT_OUT, "the rest"), *evolution]
     return [
-        Row("body_1", [share, *entries[1:]], "not measured each by itself", off=True),
-        Row("body_2", others, "", off=True),
+        EntryRow("body_1", [share, *entries[1:]], "not measured each by itself", off=True),
+        EntryRow("body_2", others, "", off=True),
     ]

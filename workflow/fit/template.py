@@ -5,11 +5,11 @@ from __future__ import annotations
 from workflow.case.sections import Section
 from workflow.case.template import EDITORS, template
 from workflow.fit.profile_schema import ProfileFit
-from workflow.fit.schema import JointFit, LoopFit, WearFit
+from workflow.fit.schema import JointFit, LoopFitSection, WearFit
 
 FITS: dict[str, tuple[type[Section], str]] = {
     "fit_joint": (JointFit, "from measurements: how friction and stiffness of a joint follow wear"),
-    "fit_loops": (LoopFit, "from measurements: a joint law, of recorded hysteresis loops"),
+    "fit_loops": (LoopFitSection, "from measurements: a joint law, of recorded hysteresis loops"),
     "fit_wear": (WearFit, "from measurements: wear coefficients, of volumes against energy"),
     "fit_profiles": (ProfileFit, "from measurements: wear coefficients, of depths and profiles"),
 }

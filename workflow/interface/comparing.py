@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from workflow import comparing
-from workflow.comparing.compared import Row
+from workflow.comparing.compared import ComparedQuantity
 from workflow.comparing.showing import columns_of, text_of
 from workflow.comparing.writing import write_comparison
 from workflow.interface.results import Results
@@ -122,7 +122,7 @@ class Comparison:
     ('light', 'heavy') {'load_path.legs.0.P': ('200 N', '400 N')} 9
     """
 
-    def __init__(self, compared: comparing.Comparison) -> None:
+    def __init__(self, compared: comparing.ComparedRuns) -> None:
         self._compared = compared
         self.names: tuple[str, ...] = tuple(compared.names)
         self.results: tuple[ComparedResult, ...] = tuple(map(_result, compared.rows))
@@ -163,7 +163,7 @@ def _listed(results: Sequence[ComparedResult], whole: bool = False) -> str:
     return "; ".join(dict.fromkeys(f"{r.of}, {r.name}" if whole else r.name for r in results))
 
 
-def _result(row: Row) -> ComparedResult:
+def _result(row: ComparedQuantity) -> ComparedResult:
     runs = range(len(row.values))
     return ComparedResult(
         row.first.group,

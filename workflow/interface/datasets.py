@@ -28,14 +28,14 @@ NUMBER = "number"
 
 
 @dataclass(frozen=True)
-class File:
+class ResultsFile:
     """File ``results.h5`` in its state when opened, since another run may replace it later."""
 
     path: Path
     written: tuple[int, ...]
 
     @classmethod
-    def at(cls, path: Path) -> File:
+    def at(cls, path: Path) -> ResultsFile:
         return cls(path, _written(path))
 
     @contextmanager
@@ -76,7 +76,7 @@ class Values(NDArrayOperatorsMixin):
     ('x', 'y') MPa 400.000 N
     """
 
-    def __init__(self, file: File, dataset: h5py.Dataset) -> None:
+    def __init__(self, file: ResultsFile, dataset: h5py.Dataset) -> None:
         self._file = file
         self.name: str = dataset.name.strip("/")
         self.unit = str(dataset.attrs.get("unit", "1"))
@@ -167,7 +167,7 @@ class Group(Mapping[str, "Group | Values"]):
     ['x', 'y'] (16,)
     """
 
-    def __init__(self, file: File, name: str = "") -> None:
+    def __init__(self, file: ResultsFile, name: str = "") -> None:
         self._file, self.name = file, name
 
     @contextmanager

@@ -15,7 +15,7 @@ from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.contact.interface import InterfaceContact, InterfaceState
-from wear.contact.link import Link
+from wear.contact.link import StructureLink
 from wear.contact.settings import InterfaceSettings
 from wear.contact.tractions import CycleTractions
 from wear.coupled import CoupledSettings, JumpSize, Stop
@@ -246,7 +246,7 @@ class FaceContact(InterfaceContact):
             )
         )
 
-    def coarse_pressure(self, loads: LoadHistory, link: Link, peak: int) -> Array:
+    def coarse_pressure(self, loads: LoadHistory, link: StructureLink, peak: int) -> Array:
         """Return the unworn peak pressure [MPa] on a grid as coarse as the structure's mesh."""
         contact = NormalContact(HalfSpace(self.coarse_grid, self.pair))
         grid = self.coarse_grid

@@ -96,7 +96,7 @@ class UserFace:
     points: Array | None = None
 
 
-class LoadSource(load_sources.LoadSource, Protocol):
+class LoadSource(load_sources.CycleSource, Protocol):
     """A source of loads for the coupled loop, with the further data that a run needs."""
 
     @property

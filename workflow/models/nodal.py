@@ -20,7 +20,7 @@ from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
-from wear.contact.link import Link
+from wear.contact.link import StructureLink
 from wear.contact.nodes import NodalContact, NodalState
 from wear.contact.tractions import ContactFields, CycleTractions, acting_slip
 from wear.coupled import CoupledState
@@ -262,7 +262,7 @@ class NodalContacts(FaceContacts):
                     start=depth,
                     loads=history.loads,
                     slip=history.slip,
-                    link=Link.none(),
+                    link=StructureLink.none(),
                     pressed=np.empty(0),
                     paths=np.empty((0, 3, 2)),
                 )
@@ -291,7 +291,7 @@ class NodalContacts(FaceContacts):
                     largest_residual=solution.residual,
                     spent=Spent() if number else Spent(len(history.slip)),
                     stable_cycles=stable,
-                    link=Link.none(),
+                    link=StructureLink.none(),
                     cycle=(),
                 )
             )

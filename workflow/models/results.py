@@ -67,7 +67,7 @@ FORCES = {"N", "N mm", "mm^3"}
 
 
 @dataclass
-class Recorder(Observer):
+class ResultsRecorder(Observer):
     """Recorder of surfaces, and of tractions at the increment ``peak``, after every jump."""
 
     contacts: FaceContacts
@@ -99,7 +99,7 @@ class WearResults:
     and volumes are per length.
     """
 
-    recorder: Recorder
+    recorder: ResultsRecorder
     state: CoupledState
     unworn: Sequence[FaceLoads]
     line: bool

@@ -14,7 +14,7 @@ from workflow.models.contact import Contact, FaceContact, Wear
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 from workflow.models.nodal import NodalContacts
-from workflow.models.results import Recorder, WearResults
+from workflow.models.results import ResultsRecorder, WearResults
 from workflow.models.structure import StructureLoads, StructureModel, StructureStore
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ class WearModel:
         loads.prepare()
         unworn = loads.unworn()
         contacts = self.face_contacts(loads)
-        recorder = Recorder(contacts, loads.peak)
+        recorder = ResultsRecorder(contacts, loads.peak)
         loop = self.loop(loads, contacts, [*observers, recorder])
         state, _ = loop.begin(unworn)
         if start is not None:

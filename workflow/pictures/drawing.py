@@ -26,7 +26,7 @@ from workflow.case.sections import Output
 from workflow.shell.analysis import Pictures, Share
 from workflow.shell.folder import OutputFolder
 from workflow.shell.isolation import Isolation
-from workflow.shell.processes import Beside, Task, attempt, share_out
+from workflow.shell.processes import Task, WorkerProcess, attempt, share_out
 
 
 def write_pictures(
@@ -35,7 +35,7 @@ def write_pictures(
     pictures: Callable[[], Pictures],
     contents: Any,
     isolated: Isolation,
-    beside: Beside | None = None,
+    beside: WorkerProcess | None = None,
     share: Share = "pictures",
     progress: Progress = unseen,
 ) -> dict[str, str]:

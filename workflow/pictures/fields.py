@@ -40,7 +40,7 @@ TICKS = 5
 ALIKE = 0.7
 
 
-class View(NamedTuple):
+class FaceWindow(NamedTuple):
     """Visible part of a face: its ends along x and along y [mm]."""
 
     x: tuple[float, float]
@@ -63,7 +63,7 @@ class Map(NamedTuple):
 # --- views --------------------------------------------------------------------------------------
 
 
-def view_of(fields: Sequence[Array], grid: Grid, margin: float = MARGIN) -> View:
+def view_of(fields: Sequence[Array], grid: Grid, margin: float = MARGIN) -> FaceWindow:
     """Return the region where any field is above 0, with a margin, or else the whole grid."""
     there = np.any([field > 0.0 for field in fields], axis=0)
     ends = []
@@ -74,19 +74,19 @@ def view_of(fields: Sequence[Array], grid: Grid, margin: float = MARGIN) -> View
         more = max(margin * (high - low), half)
         reach = 0.5 * grid.size[direction]
         ends.append((float(max(low - more, -reach)), float(min(high + more, reach))))
-    return View(*ends)
+    return FaceWindow(*ends)
 
 
-def common_views(views: Sequence[View]) -> list[View]:
+def common_views(views: Sequence[FaceWindow]) -> list[FaceWindow]:
     """Return one view that covers all, repeated, if the views are similar; else return them."""
-    together = View(
+    together = FaceWindow(
         *((min(ends)[0], max(end for _, end in ends)) for ends in zip(*views, strict=True))
     )
     alike = all(np.prod(view.size) >= ALIKE * np.prod(together.size) for view in views)
     return [together] * len(views) if alike else list(views)
 
 
-def is_upright(views: Sequence[View]) -> bool:
+def is_upright(views: Sequence[FaceWindow]) -> bool:
     """Return whether maps have y to the right and x up, because the faces are longer along y."""
     return max(view.size[1] / view.size[0] for view in views) > LONGER
 
@@ -141,14 +141,14 @@ def scaled_panels(title: str, heights: Sequence[float], columns: int) -> tuple[F
     return figure, axes
 
 
-def _height(view: View, turned: bool) -> float:
+def _height(view: FaceWindow, turned: bool) -> float:
     """Return the ratio of height to width of a map."""
     x, y = view.size
     return x / y if turned else y / x
 
 
 def draw_map(
-    axis: Axes, field: Array, grid: Grid, top: float, view: View, turned: bool = False
+    axis: Axes, field: Array, grid: Grid, top: float, view: FaceWindow, turned: bool = False
 ) -> Any:
     """Draw one field, to scale unless very flat; return the image. ``turned``: y to the right."""
     half = 0.5 * grid.size[0], 0.5 * grid.size[1]

@@ -20,7 +20,7 @@ from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.pictures.style import AMBER, BLACK, BLUE, ORANGE
 from workflow.shell.analysis import Pictures
-from workflow.shell.measured import Beside, beside
+from workflow.shell.measured import MeasuredCurve, beside
 from workflow.shell.quantities import CurvesOf
 
 # Name of the figure with all measured points.
@@ -48,7 +48,7 @@ def with_measured(
 
 def _found(
     measured: Sequence[Measured], curves: Sequence[CurvesOf], file: h5py.File
-) -> Iterator[Beside]:
+) -> Iterator[MeasuredCurve]:
     """Yield the entries that can be compared; a warning of the run explains why others cannot."""
     for entry in measured:
         try:
@@ -98,7 +98,7 @@ def _unit(label: str, base: str) -> float:
         return float("nan")
 
 
-def _is_of(line: Line2D, found: Beside, x_unit: float, y_unit: float) -> bool:
+def _is_of(line: Line2D, found: MeasuredCurve, x_unit: float, y_unit: float) -> bool:
     """Return whether a line shows the curve, in these units."""
     drawn = (np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float))
     return _same(drawn[0] * x_unit, found.curve.x) and _same(drawn[1] * y_unit, found.curve.y)
@@ -113,7 +113,7 @@ def _same(drawn: Array, curve: Array) -> bool:
 
 def _draw_points(
     axis: Axes,
-    found: Beside,
+    found: MeasuredCurve,
     x_unit: float,
     y_unit: float,
     marker: str,
@@ -152,7 +152,7 @@ def _draw_all(measured: Sequence[Measured], curves: Sequence[CurvesOf], file: h5
     return figure
 
 
-def _draw_beside(left: Axes, right: Axes, found: Beside) -> None:
+def _draw_beside(left: Axes, right: Axes, found: MeasuredCurve) -> None:
     curve, points = found.curve, found.points
     x_name, x_unit = suited(_most(curve.x, points.x), curve.x_unit)
     y_name, y_unit = suited(

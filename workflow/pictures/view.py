@@ -36,7 +36,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class Scene:
+class PictureScene:
     """One to four ``views``; ``time`` names their times, and ``begin`` is the first one shown."""
 
     title: str
@@ -45,7 +45,7 @@ class Scene:
     views: Sequence[View]
 
 
-def write_view(scene: Scene, path: Path) -> Path:
+def write_view(scene: PictureScene, path: Path) -> Path:
     """Write the script that shows a scene; return its path."""
     script = resources.files("workflow.pictures").joinpath("view_script.py")
     text = script.read_text(encoding="utf-8")

@@ -47,7 +47,7 @@ def folder() -> Path:
     raise SystemExit(f"{first}: not found; start ParaView in the folder of this script")
 
 
-class Series:
+class ShownFile:
     """File that is shown, with the ranges of its arrays over its times."""
 
     def __init__(self, path: Path) -> None:
@@ -73,7 +73,7 @@ class Series:
         return min((low for low, _ in found), default=0.0), max((h for _, h in found), default=0.0)
 
 
-class View:
+class ScriptView:
     """View of the window: sources, each with its colours and its motion."""
 
     def __init__(self, view: Any, title: str) -> None:
@@ -81,7 +81,7 @@ class View:
         self._extents, self._moved = [0.0, 0.0, 0.0], False
         view.OrientationAxesVisibility = 1
 
-    def show(self, series: Series, shown: dict[str, Any]) -> None:
+    def show(self, series: ShownFile, shown: dict[str, Any]) -> None:
         """Show a series, moved along a vector and coloured by an array if it has these."""
         self._extents = [max(pair) for pair in zip(self._extents, series.extent())]  # noqa: B905
         source = series.reader
@@ -107,7 +107,7 @@ class View:
         power = 10.0 ** math.floor(math.log10(wanted))
         return max(step * power for step in (1, 2, 5) if step == 1 or step * power <= wanted)
 
-    def _colour(self, display: Any, series: Series, name: str) -> None:
+    def _colour(self, display: Any, series: ShownFile, name: str) -> None:
         simple.ColorBy(display, ("POINTS", name))
         colours = simple.GetColorTransferFunction(name)
         low, high = series.span(name)
@@ -119,7 +119,7 @@ class View:
         bar = simple.GetScalarBar(colours, self.view)
         bar.Title, bar.ComponentTitle = name, ""
 
-    def label(self, series: Series, time_is: str) -> None:
+    def label(self, series: ShownFile, time_is: str) -> None:
         """Show the title and the time."""
         title = simple.Text(registrationName=self._title, Text=self._title)
         label = simple.Show(title, self.view)
@@ -172,14 +172,14 @@ def main() -> None:
     """Build the views, go to the first time, and write the picture that was requested."""
     simple.LoadPalette("WhiteBackground")
     here = folder()
-    opened: dict[str, Series] = {}
+    opened: dict[str, ShownFile] = {}
     window, places = cut_window(len(SCENE["views"]))
     views = []
     for place, wanted in zip(places, SCENE["views"]):  # noqa: B905
-        view = View(place, wanted["title"])
+        view = ScriptView(place, wanted["title"])
         for shown in wanted["shown"]:
             if shown["file"] not in opened:
-                opened[shown["file"]] = Series(here / shown["file"])
+                opened[shown["file"]] = ShownFile(here / shown["file"])
             view.show(opened[shown["file"]], shown)
         view.label(opened[wanted["shown"][0]["file"]], SCENE["time"])
         views.append(view)

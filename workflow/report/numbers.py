@@ -8,7 +8,7 @@ from typing import Any
 from workflow.case.readable import percent, readable
 from workflow.case.typeset import MINUS, number, unparted
 from workflow.report.page import Html, element, lines, note, table, unbroken
-from workflow.shell.quantities import Quantity
+from workflow.shell.quantities import SummaryQuantity
 from workflow.shell.summary import number_at, required_number
 
 # Largest number of groups side by side, so that a table fits on a sheet of paper.
@@ -18,10 +18,10 @@ LETTERS = "abcdefgh"
 # Smallest share of their names that groups in one table must have in common.
 ALIKE = 0.5
 
-Groups = dict[str, dict[str, Quantity]]
+Groups = dict[str, dict[str, SummaryQuantity]]
 
 
-def results(quantities: Sequence[Quantity], summary: Mapping[str, Any]) -> Html:
+def results(quantities: Sequence[SummaryQuantity], summary: Mapping[str, Any]) -> Html:
     """Return tables of all quantities, and a note on their errors."""
     marks = _marks(quantities)
     parts = []
@@ -39,7 +39,7 @@ def _share(names: Sequence[str], part: int, parts: int) -> Sequence[str]:
     return names[part * len(names) // parts : (part + 1) * len(names) // parts]
 
 
-def _families(quantities: Iterable[Quantity]) -> list[Groups]:
+def _families(quantities: Iterable[SummaryQuantity]) -> list[Groups]:
     """Return quantities by group and name, with similar groups together."""
     groups: Groups = {}
     for quantity in quantities:
@@ -70,7 +70,7 @@ def _table(groups: Groups, summary: Mapping[str, Any], marks: Mapping[str, str])
 
 
 def _cell(
-    quantity: Quantity | None, summary: Mapping[str, Any], marks: Mapping[str, str]
+    quantity: SummaryQuantity | None, summary: Mapping[str, Any], marks: Mapping[str, str]
 ) -> object:
     if quantity is None:
         return "–"
@@ -78,7 +78,7 @@ def _cell(
     return value_of(quantity, required_number(summary, quantity.path), mark)
 
 
-def value_of(quantity: Quantity, value: float, mark: str = "") -> Html:
+def value_of(quantity: SummaryQuantity, value: float, mark: str = "") -> Html:
     """Return a value with its unit and estimated error, which may have a ``mark`` for a note."""
     text = number(str(readable(value, quantity.unit, quantity.error, quantity.everyday)))
     shown = unbroken(text)
@@ -91,13 +91,13 @@ def value_of(quantity: Quantity, value: float, mark: str = "") -> Html:
     return element("span", shown, " ", element("span", error, noted, cls="error"))
 
 
-def _marks(quantities: Sequence[Quantity]) -> dict[str, str]:
+def _marks(quantities: Sequence[SummaryQuantity]) -> dict[str, str]:
     """Return a letter for each kind of error, or nothing if there is only one kind."""
     sources = list(dict.fromkeys(q.error_of for q in quantities if q.error is not None))
     return dict(zip(sources, LETTERS, strict=False)) if len(sources) > 1 else {}
 
 
-def _note(quantities: Sequence[Quantity], marks: Mapping[str, str]) -> Html:
+def _note(quantities: Sequence[SummaryQuantity], marks: Mapping[str, str]) -> Html:
     """Return a note on what the errors cover and whether some results have none."""
     known = [quantity for quantity in quantities if quantity.error is not None]
     if not known:
@@ -112,7 +112,7 @@ def _note(quantities: Sequence[Quantity], marks: Mapping[str, str]) -> Html:
 # --- error budget -------------------------------------------------------------------------------
 
 
-def error_budget(quantities: Sequence[Quantity], summary: Mapping[str, Any]) -> Html:
+def error_budget(quantities: Sequence[SummaryQuantity], summary: Mapping[str, Any]) -> Html:
     """Return a table of the parts of each error; empty if no error has parts."""
     budgets = {q.budget: q for q in quantities if q.budget}
     parts = {path: _parts(summary, path) for _, path in budgets}

@@ -31,7 +31,7 @@ from workflow.report.page import (
 )
 from workflow.report.told import ToldRun
 from workflow.shell.expectations import Verdict, verdicts
-from workflow.shell.quantities import Quantity
+from workflow.shell.quantities import SummaryQuantity
 from workflow.shell.summary import QuantityError, counted_from_first
 
 # Sections of a case that do not affect the results, and those that most readers look for.
@@ -149,7 +149,7 @@ def _expectations(run: ToldRun) -> Html:
     return lines([table(head, rows, numbers=(1, 2, 3, 4), stacks=True), html(told)])
 
 
-def _verdict_cells(verdict: Verdict | str, quantity: Quantity | None) -> list[object]:
+def _verdict_cells(verdict: Verdict | str, quantity: SummaryQuantity | None) -> list[object]:
     if isinstance(verdict, str):
         return ["", "", "", "", element("span", verdict, cls="bad")]
     met = (
@@ -167,7 +167,7 @@ def _verdict_cells(verdict: Verdict | str, quantity: Quantity | None) -> list[ob
     return [*(unbroken(number(text)) for text in (expected, computed, *errors)), met]
 
 
-def _as_expected(value: float, unit: str, quantity: Quantity | None) -> str:
+def _as_expected(value: float, unit: str, quantity: SummaryQuantity | None) -> str:
     """Return a value in the unit of the expectation, or, for a bare number, of the quantity."""
     if unit or quantity is None:
         return f"{readable(value, '1', GIVEN).number} {pretty(unit)}".strip()

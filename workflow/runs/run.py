@@ -25,7 +25,7 @@ from workflow.shell.checkpoint import StoredState
 from workflow.shell.folder import ASIDE, MANIFEST, REPORT, OutputFolder
 from workflow.shell.lock import locked
 from workflow.shell.measured import check_measured, tell_measured
-from workflow.shell.processes import Beside
+from workflow.shell.processes import WorkerProcess
 from workflow.shell.reporter import FORECAST, SHORT_RUN, TERMINAL, Reporter, telling
 from workflow.shell.run_time import RunTime
 from workflow.shell.screen import Loudness, Screen
@@ -233,7 +233,7 @@ def _run(
     drawn: list[str] = []
     with (
         closing(Reporter(folder.reserve_log(), resume, loudness=loudness)) as reporter,
-        closing(Beside()) as beside,
+        closing(WorkerProcess()) as beside,
     ):
         with reporter.isolated(FORECAST):
             reporter.expected = analysis.run_time(case)

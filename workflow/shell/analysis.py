@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from workflow.case.sections import Case
 from workflow.shell.memory import Memory
-from workflow.shell.processes import Beside
+from workflow.shell.processes import WorkerProcess
 from workflow.shell.run_time import RunTime
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from workflow.shell.checkpoint import StoredState
     from workflow.shell.folder import OutputFolder
-    from workflow.shell.quantities import CurvesOf, Quantity
+    from workflow.shell.quantities import CurvesOf, SummaryQuantity
     from workflow.shell.reporter import Reporter
 
 AnyCase = TypeVar("AnyCase", bound=Case)
@@ -74,7 +74,7 @@ class Run(Generic[AnyCase]):
     draw: Callable[[Any], None]
     measured: Callable[[], list[dict[str, Any]]]
     report: Callable[[Summary], None]
-    beside: Beside
+    beside: WorkerProcess
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def as_written(case: Any) -> tuple[Any, None]:
     return case, None
 
 
-def no_quantities(case: Any, summary: Summary) -> Sequence[Quantity]:
+def no_quantities(case: Any, summary: Summary) -> Sequence[SummaryQuantity]:
     """Return no quantities, for an analysis that names none."""
     return ()
 
@@ -109,7 +109,7 @@ def expected(case: Case, summary: Summary) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Comparison(Generic[AnyCase]):
+class ChartComparison(Generic[AnyCase]):
     """Rules by which a chart compares two runs of an analysis.
 
     Attributes
@@ -184,12 +184,12 @@ class Analysis(Generic[AnyCase]):
     run: Callable[[Run[AnyCase]], None]
     memory: Callable[[AnyCase], Memory]
     run_time: Callable[[AnyCase], RunTime]
-    quantities: Callable[[AnyCase, Summary], Sequence[Quantity]] = no_quantities
+    quantities: Callable[[AnyCase, Summary], Sequence[SummaryQuantity]] = no_quantities
     curves: Sequence[CurvesOf] = ()
     pictures: Callable[[], Pictures] | None = None
     beside: Share = "nothing"
     resumable: bool = False
     choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = as_written
-    comparison: Comparison[AnyCase] = Comparison()
+    comparison: ChartComparison[AnyCase] = ChartComparison()
     write_loads: Callable[[AnyCase, str, Path, bool], Sequence[str]] | None = None
     draw_faces: Callable[[AnyCase, str, Path, bool], Path] | None = None

@@ -38,21 +38,21 @@ AT_END = 1e-9
 
 
 @dataclass(frozen=True)
-class Points:
+class MeasuredPoints:
     """Measured points, arrays ``(n,)`` in base units; ``deviations`` are None if not known."""
 
     x: Array
     y: Array
     deviations: Array | None
 
-    def only(self, chosen: Mask) -> Points:
+    def only(self, chosen: Mask) -> MeasuredPoints:
         """Return the points selected by a mask ``(n,)``."""
         deviations = None if self.deviations is None else self.deviations[chosen]
-        return Points(self.x[chosen], self.y[chosen], deviations)
+        return MeasuredPoints(self.x[chosen], self.y[chosen], deviations)
 
 
 @dataclass(frozen=True)
-class Beside:
+class MeasuredCurve:
     """Measured points together with the computed curve that they are compared with.
 
     ``computed`` ``(n,)`` is NaN outside the curve. ``several`` is true if the curve takes several
@@ -62,7 +62,7 @@ class Beside:
 
     entry: Measured
     curve: Curve
-    points: Points
+    points: MeasuredPoints
     computed: Array
     several: bool
     error: float | None
@@ -106,7 +106,7 @@ def _refusal(entry: Measured, x_unit: str, y_unit: str) -> str:
     return ""
 
 
-def beside(entry: Measured, file: h5py.File, curves: Sequence[CurvesOf]) -> Beside:
+def beside(entry: Measured, file: h5py.File, curves: Sequence[CurvesOf]) -> MeasuredCurve:
     """Compare the points of an entry with its curve in a ``results.h5``. Raises UserError."""
     found = [curve for wanted in curves for curve in curves_in(file, wanted)]
     titles = [curve.title for curve in found]
@@ -122,13 +122,13 @@ def beside(entry: Measured, file: h5py.File, curves: Sequence[CurvesOf]) -> Besi
     return compared(entry, curve, points)
 
 
-def compared(entry: Measured, curve: Curve, points: Points) -> Beside:
+def compared(entry: Measured, curve: Curve, points: MeasuredPoints) -> MeasuredCurve:
     """Compare points with a curve, interpolated at each of them."""
     crossings = [_crossings(curve.x, curve.y, x) for x in points.x]
     computed = np.array([_nearest(c, y) for c, y in zip(crossings, points.y, strict=True)])
     error = _interpolation_error(curve, points.x, computed)
     several = any(np.ptp(c) > 0.0 for c in crossings if c.size > 1)
-    return Beside(entry, curve, points, computed, several, error)
+    return MeasuredCurve(entry, curve, points, computed, several, error)
 
 
 def _interpolation_error(curve: Curve, x: Array, computed: Array) -> float | None:
@@ -154,7 +154,7 @@ def _between(x: Array, ends: Array) -> Mask:
     return (ends.min() <= x) & (x <= ends.max())
 
 
-def read_points(entry: Measured, x_unit: str, y_unit: str) -> Points:
+def read_points(entry: Measured, x_unit: str, y_unit: str) -> MeasuredPoints:
     """Return the points of an entry in base units.
 
     If a base unit is "", numbers are only read, in their given unit. Raises InputFileError with
@@ -177,10 +177,10 @@ def read_points(entry: Measured, x_unit: str, y_unit: str) -> Points:
     if given is not None and not np.all(given > 0.0):
         row = int(np.flatnonzero(given <= 0.0)[0]) + 1
         raise InputFileError(f"{shown(entry.curve)}: point {row}: no deviation; allowed: above 0")
-    return Points(x, y, given)
+    return MeasuredPoints(x, y, given)
 
 
-def told(found: Beside) -> dict[str, Any]:
+def told(found: MeasuredCurve) -> dict[str, Any]:
     """Return the comparison for the summary: computed minus measured, in base units.
 
     Relative deviations are relative to the mean and the rms of all measured values, since single

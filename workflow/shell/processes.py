@@ -120,7 +120,7 @@ def workers(make: Callable[[Any, Done], Answering], settings: Sequence[Any]) -> 
         yield Workers(processes)
 
 
-class Beside:
+class WorkerProcess:
     """Background process with one thread that does jobs one after the other.
 
     It starts with the first job, and :meth:`close` ends it, busy or not.
@@ -149,7 +149,7 @@ class Beside:
 
 
 def share_out(
-    tasks: Sequence[Task], beside: Beside | None = None, done: Done = _unheard, own: int = 0
+    tasks: Sequence[Task], beside: WorkerProcess | None = None, done: Done = _unheard, own: int = 0
 ) -> list[Any]:
     """Do tasks here from the first onwards, and in the process ``beside`` from the last backwards.
 

@@ -13,7 +13,7 @@ ANY, LAST = "*", "-1"
 
 
 @dataclass(frozen=True)
-class Quantity:
+class SummaryQuantity:
     """Number at ``path`` in the summary, in the base ``unit`` ("1" for none).
 
     ``group`` names the object it belongs to, such as an interface; it is empty for the whole run.

@@ -14,7 +14,7 @@ from sa_solver.types import Progress
 from workflow.shell.forecast import Forecast, about
 from workflow.shell.isolation import Isolation
 from workflow.shell.run_time import RunTime
-from workflow.shell.screen import Loudness, Row, Screen, console
+from workflow.shell.screen import Loudness, ProgressRow, Screen, console
 from workflow.shell.store import check_regular
 
 T = TypeVar("T")
@@ -39,7 +39,7 @@ class _Course:
     """Progress of the long part of a run; ``told`` is the last forecast of its whole time shown."""
 
     name: str
-    row: Row
+    row: ProgressRow
     forecast: Forecast
     told: float | None = None
 
@@ -51,7 +51,7 @@ class _Stage:
         self,
         name: str,
         of: str,
-        row: Row,
+        row: ProgressRow,
         say: Callable[[str], None] | None,
         isolated: Isolation,
     ) -> None:

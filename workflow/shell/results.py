@@ -35,7 +35,7 @@ CELLS = "x", "y"
 
 
 @dataclass(frozen=True)
-class Along:
+class CurveAxis:
     """Marks datasets as curves over the dataset of this name, in the same group or given by a path.
 
     It applies to the datasets that have the same length.
@@ -61,7 +61,12 @@ class ResultsWriter:
         self._file, self._line = file, line
 
     def put(
-        self, group: str, datasets: Datasets, over: Along | On | None = None, /, **attributes: Any
+        self,
+        group: str,
+        datasets: Datasets,
+        over: CurveAxis | On | None = None,
+        /,
+        **attributes: Any,
     ) -> None:
         """Write datasets to a new or existing group; attributes that are None are left out.
 
@@ -78,7 +83,7 @@ class ResultsWriter:
         made = [place[name] for name in datasets]
         if isinstance(over, On):
             self._label_fields(made, over.grid)
-        elif isinstance(over, Along):
+        elif isinstance(over, CurveAxis):
             self._label_curves(made, place, over.name)
 
     def _label_fields(self, made: Sequence[h5py.Dataset], grid: str) -> None:

@@ -39,7 +39,7 @@ def console() -> Console:
     return Console(stderr=True, highlight=False, force_jupyter=False)
 
 
-class Row:
+class ProgressRow:
     """Row of one task, with its progress as a bar and in words."""
 
     def __init__(self, rows: Progress, task: TaskID, isolated: Isolation) -> None:
@@ -86,14 +86,14 @@ class Screen:
         return self._on
 
     @contextmanager
-    def row(self, name: str) -> Iterator[Row]:
+    def row(self, name: str) -> Iterator[ProgressRow]:
         """Show a row while a task of this ``name`` is in progress."""
         # An invalid number, used if the row cannot be added.
         task = TaskID(-1)
         with self._isolated(ROWS):
             task = self._rows.add_task(name, total=None, at="", left="")
         try:
-            yield Row(self._rows, task, self._isolated)
+            yield ProgressRow(self._rows, task, self._isolated)
         finally:
             with self._isolated(ROWS):
                 self._rows.remove_task(task)

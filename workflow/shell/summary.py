@@ -8,7 +8,7 @@ from typing import Any
 
 from workflow.shell.analysis import Run
 from workflow.shell.measured import doubts_of_measured, lines_of_measured
-from workflow.shell.quantities import Quantity
+from workflow.shell.quantities import SummaryQuantity
 from workflow.shell.reporter import TERMINAL
 from workflow.shell.versions import versions
 
@@ -90,7 +90,9 @@ def number_at(summary: Mapping[str, Any], path: str) -> float | None:
         return None
 
 
-def told(summary: Mapping[str, Any], quantities: Iterable[Quantity]) -> list[Quantity]:
+def told(
+    summary: Mapping[str, Any], quantities: Iterable[SummaryQuantity]
+) -> list[SummaryQuantity]:
     """Return the quantities for which the summary has a number."""
     return [quantity for quantity in quantities if number_at(summary, quantity.path) is not None]
 

@@ -23,7 +23,7 @@ from workflow.shell.curves import Curve, curves_in
 from workflow.shell.folder import OutputFolder
 from workflow.sweep.bands import FEWEST, Piece, curve_band, quantiles
 from workflow.sweep.first_order import sides
-from workflow.sweep.table import Row
+from workflow.sweep.table import SweepRow
 
 # Heights of a row of panels, and of title and legend [inches].
 ROW, REST = 4.0, 1.3
@@ -55,7 +55,7 @@ def to_first_order(runs: int) -> Way:
 def write_band_figures(
     title: str,
     analysis: Analysis[Any],
-    rows: Sequence[Row],
+    rows: Sequence[SweepRow],
     folder: Path,
     way: Way = OF_A_SAMPLE,
 ) -> list[Path]:
@@ -72,7 +72,7 @@ def write_band_figures(
     return write_figures(drawn.items(), folder)
 
 
-def _curves(analysis: Analysis[Any], rows: Sequence[Row]) -> Curves:
+def _curves(analysis: Analysis[Any], rows: Sequence[SweepRow]) -> Curves:
     """Return the curves of the finished runs, by title."""
     curves: Curves = {}
     for row in rows:

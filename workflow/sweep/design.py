@@ -17,8 +17,16 @@ from workflow.case.writing import scalar
 from workflow.errors import CaseError
 from workflow.runs.job import Job
 from workflow.sweep.first_order import positions
-from workflow.sweep.fitted import REACH, FittedParameter, FittedSample
-from workflow.sweep.schema import DRAWN, MOST_RUNS, Amount, LogNormal, Normal, Sweep, Variation
+from workflow.sweep.fitted import REACH, DrawnParameter, FittedSample
+from workflow.sweep.schema import (
+    DRAWN,
+    MOST_RUNS,
+    LogNormal,
+    Normal,
+    Sweep,
+    Variation,
+    WrittenNumber,
+)
 
 # Largest length of a folder name; a longer name is shortened with a hash.
 LONGEST_NAME = 100
@@ -27,7 +35,7 @@ QUIET = {"output.paraview": False, "output.figures": False}
 
 
 @dataclass(frozen=True)
-class Run:
+class SweepRun:
     """One run of a sweep: its name, and the varied values, as written, by path."""
 
     name: str
@@ -40,7 +48,7 @@ class Run:
         return Job(self.name, Path(sweep.file.case), overrides)
 
 
-def runs_of(sweep: Sweep) -> list[Run]:
+def runs_of(sweep: Sweep) -> list[SweepRun]:
     """Return the runs of a sweep, which a sample may contain twice; raise CaseError."""
     varied = sweep.file.variations()
     paths = list(varied)
@@ -50,7 +58,7 @@ def runs_of(sweep: Sweep) -> list[Run]:
     else:
         rows = _combined(sweep, [_listed(variation) for variation in varied.values()])
     named = zip(_names(_short_names(paths), rows), rows, strict=True)
-    return [Run(name, dict(zip(paths, row, strict=True))) for name, row in named]
+    return [SweepRun(name, dict(zip(paths, row, strict=True))) for name, row in named]
 
 
 def _combined(sweep: Sweep, columns: list[list[Any]]) -> list[tuple[Any, ...]]:
@@ -79,14 +87,14 @@ def _listed(variation: Variation) -> list[Any]:
     return [_written(first, number) for number in numbers]
 
 
-def _between(first: Amount, last: Amount, share: Array, scale: str) -> Array:
+def _between(first: WrittenNumber, last: WrittenNumber, share: Array, scale: str) -> Array:
     """Return numbers at ``share`` (0 to 1) of the way between two ends."""
     if scale == "log":
         return np.asarray(first.number * (last.number / first.number) ** share)
     return np.asarray(first.number * (1.0 - share) + last.number * share)
 
 
-def _written(like: Amount, number: float) -> int | float | str:
+def _written(like: WrittenNumber, number: float) -> int | float | str:
     return like.with_number(float(number)).written
 
 
@@ -123,7 +131,7 @@ def _drawn(variation: Variation, share: Array) -> list[Any]:
     return [_written(first, number) for number in numbers]
 
 
-def _quantiles(distribution: Any, share: Array) -> tuple[Amount, Array]:
+def _quantiles(distribution: Any, share: Array) -> tuple[WrittenNumber, Array]:
     """Return quantiles of a distribution, and an amount with their unit."""
     from scipy.special import ndtri
 
@@ -148,7 +156,7 @@ def _stepped(sweep: Sweep) -> dict[str, list[Any]]:
     return known.given(positions(len(known.parameters)))
 
 
-def _normal(name: str, distribution: Any) -> FittedParameter:
+def _normal(name: str, distribution: Any) -> DrawnParameter:
     """Return an entry with a normal or lognormal distribution in the form of a fitted parameter."""
     logarithmic = isinstance(distribution, LogNormal)
     best = distribution.median if logarithmic else distribution.mean
@@ -158,7 +166,7 @@ def _normal(name: str, distribution: Any) -> FittedParameter:
     else:
         reach = REACH * distribution.deviation.number
         bounds = best.number - reach, best.number + reach
-    return FittedParameter(
+    return DrawnParameter(
         name, best.number, best.unit or "1", bounds, (-np.inf, np.inf), logarithmic, (name,)
     )
 

@@ -24,7 +24,7 @@ from workflow.pictures.panels import (
 )
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
-from workflow.sweep.table import Row, Varied, columns_of, interfaces_of, unit_of, varied_in
+from workflow.sweep.table import SweepRow, Varied, columns_of, interfaces_of, unit_of, varied_in
 
 # Largest number of runs that can be distinguished as separate lines.
 LINES = 30
@@ -48,7 +48,7 @@ MOST_ROWS = 2
 LINE_CONTACT = "states.-1.contact_half_width"
 
 
-def write_sweep_figures(title: str, rows: Sequence[Row], folder: Path) -> list[Path]:
+def write_sweep_figures(title: str, rows: Sequence[SweepRow], folder: Path) -> list[Path]:
     """Draw the figures of a sweep as PNG files; return their paths."""
     figures = {}
     if names := _wearing(rows):
@@ -60,7 +60,7 @@ def write_sweep_figures(title: str, rows: Sequence[Row], folder: Path) -> list[P
     return write_figures(figures.items(), folder)
 
 
-def _wearing(rows: Sequence[Row]) -> list[str]:
+def _wearing(rows: Sequence[SweepRow]) -> list[str]:
     """Return the interfaces that wear in any of the runs."""
     summaries = [row.finished.summary or {} for row in rows]
     return list(dict.fromkeys(name for summary in summaries for name in interfaces_of(summary)))
@@ -69,7 +69,7 @@ def _wearing(rows: Sequence[Row]) -> list[str]:
 # --- over the cycles ----------------------------------------------------------------------------
 
 
-def kinetics_bands(title: str, rows: Sequence[Row], names: Sequence[str]) -> Figure:
+def kinetics_bands(title: str, rows: Sequence[SweepRow], names: Sequence[str]) -> Figure:
     """Draw depth and volume of all runs against cycles, by interface."""
     done = [row.finished.summary for row in rows if row.finished.summary]
     statistics = "median (least to largest) at their end"
@@ -137,7 +137,7 @@ class Panel:
     values: Array
 
 
-def _panels(rows: Sequence[Row], names: Sequence[str]) -> list[list[Panel]]:
+def _panels(rows: Sequence[SweepRow], names: Sequence[str]) -> list[list[Panel]]:
     """Return panels by row and column of a figure, for the wearing interfaces ``names`` if any."""
     columns = columns_of(rows)
     if names:
@@ -160,7 +160,7 @@ def _panels(rows: Sequence[Row], names: Sequence[str]) -> list[list[Panel]]:
     ]
 
 
-def _unit(name: str, rows: Sequence[Row]) -> str:
+def _unit(name: str, rows: Sequence[SweepRow]) -> str:
     """Return the unit of a column, for an axis."""
     return unit_of(name, rows).replace("^3", "³")
 

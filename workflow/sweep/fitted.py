@@ -29,7 +29,7 @@ SIGNIFICANT = 10
 
 
 @dataclass(frozen=True)
-class FittedParameter:
+class DrawnParameter:
     """Parameter in its ``unit`` ("1" for none): ``value``, 95 % ``bounds``, and limits ``allowed``.
 
     ``entries`` are the entries of a case that contain it: several, where functions share it.
@@ -61,7 +61,7 @@ class FittedParameter:
 class FittedSample:
     """Parameters that entries of a case contain, and their ``correlation`` ``(p, p)``."""
 
-    parameters: tuple[FittedParameter, ...]
+    parameters: tuple[DrawnParameter, ...]
     correlation: Array
 
     @property
@@ -92,7 +92,7 @@ class FittedSample:
             for entry in parameter.entries
         }
 
-    def beside(self, others: Sequence[FittedParameter]) -> FittedSample:
+    def beside(self, others: Sequence[DrawnParameter]) -> FittedSample:
         """Return a sample with further parameters, which are uncorrelated with all others."""
         here, count = len(self.parameters), len(self.parameters) + len(others)
         correlation = np.eye(count)
@@ -123,13 +123,13 @@ def read_fit(path: Path) -> FittedSample:
     return FittedSample(tuple(parameters), _correlation(matrix, here))
 
 
-def _parameter(name: str, told: Mapping[str, Any]) -> FittedParameter:
+def _parameter(name: str, told: Mapping[str, Any]) -> DrawnParameter:
     if not told["determined"]:
         raise UserError(
             f"{name}: not determined by the fit ({told['doubt']}); allowed: a fit that holds it"
         )
     lower, upper = told["allowed"]
-    return FittedParameter(
+    return DrawnParameter(
         name,
         float(told["value"]),
         str(told["unit"]),

@@ -29,10 +29,10 @@ from workflow.shell.screen import Loudness
 from workflow.shell.store import write_text
 from workflow.shell.versions import versions
 from workflow.sweep.bands import FEWEST, band_of
-from workflow.sweep.design import Run, runs_of
+from workflow.sweep.design import SweepRun, runs_of
 from workflow.sweep.first_order import LINEAR, first_order
 from workflow.sweep.schema import DRAWN, Sweep, load_sweep
-from workflow.sweep.table import Row, columns_of, spread, unit_of, varied_in, write_sweep_table
+from workflow.sweep.table import SweepRow, columns_of, spread, unit_of, varied_in, write_sweep_table
 
 FILE, RUNS, TABLE, LOG = "sweep.yaml", "runs", "sweep.csv", "sweep.log"
 FIGURES = "figures"
@@ -84,7 +84,7 @@ def run_sweep(
     return failed == 0
 
 
-def _check_runs(sweep: Sweep, runs: Sequence[Run], out: Path, force: bool) -> int:
+def _check_runs(sweep: Sweep, runs: Sequence[SweepRun], out: Path, force: bool) -> int:
     """Load the case and check the folder of every run; return how many are finished."""
     wrong: dict[str, None] = {}
     states = []
@@ -122,13 +122,13 @@ def _explained(sweep: Sweep, job: Job, text: str) -> Iterator[str]:
 
 def _run(
     sweep: Sweep,
-    runs: Sequence[Run],
+    runs: Sequence[SweepRun],
     folder: OutputFolder,
     processes: int | None,
     dask: str | None,
     finished_before: int,
     reporter: Reporter,
-) -> list[Row]:
+) -> list[SweepRow]:
     """Run each different run once; always write the table of those that have ended.
 
     The ``finished_before`` runs end first. A sample may contain the same run twice, which then has
@@ -163,13 +163,13 @@ def _run(
                 running=running,
             )
     finally:
-        rows = [Row(run, ended[run.name]) for run in runs if run.name in ended]
+        rows = [SweepRow(run, ended[run.name]) for run in runs if run.name in ended]
         if rows:
             write_sweep_table(rows, folder.reserve(TABLE, "values and results of every run"))
     return rows
 
 
-def _write_summary(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
+def _write_summary(sweep: Sweep, rows: list[SweepRow], folder: OutputFolder) -> None:
     columns = columns_of(rows)
     summary = {
         "title": _title(sweep, rows),
@@ -209,7 +209,7 @@ def _stepped(values: Array) -> dict[str, Any] | None:
     return {"best": float(found.middle), "band": found.told(), "bent": found.bent}
 
 
-def _lacking(sweep: Sweep, rows: Sequence[Row]) -> str:
+def _lacking(sweep: Sweep, rows: Sequence[SweepRow]) -> str:
     """Return which bands cannot be determined; empty if there are all."""
     done = sum(row.done for row in rows)
     if sweep.file.design == "sample" and done < FEWEST:
@@ -232,7 +232,7 @@ def _bent(values: Array) -> bool:
     return found is not None and found["band"] is None
 
 
-def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
+def _title(sweep: Sweep, rows: Sequence[SweepRow]) -> str:
     """Return the title of the sweep, or else that of its first run."""
     if sweep.file.title is not None:
         return sweep.file.title
@@ -240,7 +240,7 @@ def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
     return next((str(summary["title"]) for summary in summaries), sweep.name)
 
 
-def _write_figures(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
+def _write_figures(sweep: Sweep, rows: list[SweepRow], folder: OutputFolder) -> None:
     if not any(row.done for row in rows):
         return
     from workflow.sweep.figures import write_sweep_figures

@@ -27,7 +27,7 @@ SIGNIFICANT = 6
 
 
 @dataclass(frozen=True)
-class Amount:
+class WrittenNumber:
     """Number and the unit it was written with, "" for none."""
 
     number: float
@@ -47,12 +47,12 @@ class Amount:
         sizes = [units.to_base(f"1 {name}", None) if name else 1.0 for name in (self.unit, unit)]
         return self.number * sizes[0] / sizes[1]
 
-    def with_number(self, number: float) -> Amount:
+    def with_number(self, number: float) -> WrittenNumber:
         """Return another number with the same unit, rounded."""
-        return Amount(float(f"{number:.{SIGNIFICANT}g}"), self.unit)
+        return WrittenNumber(float(f"{number:.{SIGNIFICANT}g}"), self.unit)
 
 
-def amount_of(value: object) -> Amount | None:
+def amount_of(value: object) -> WrittenNumber | None:
     """Return a value of an entry as a number with its unit; None if it is not a number."""
     if isinstance(value, str):
         try:
@@ -60,14 +60,14 @@ def amount_of(value: object) -> Amount | None:
             units.to_base(value, None)
         except (units.UnitError, ArithmeticError):
             return None
-        return Amount(float(number), unit)
+        return WrittenNumber(float(number), unit)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return Amount(float(value)) if is_finite(value) else None
+    return WrittenNumber(float(value)) if is_finite(value) else None
 
 
 @dataclass(frozen=True)
-class Quantity(Entry):
+class SweptNumber(Entry):
     """Number with or without a unit; the case checks whether the unit is suitable."""
 
     positive: bool = False
@@ -76,8 +76,8 @@ class Quantity(Entry):
     def allowed(self) -> str:
         return f"a {'positive ' if self.positive else ''}number, with a unit where the case has one"
 
-    def parse(self, value: object) -> Amount:
-        amount = value if isinstance(value, Amount) else amount_of(value)
+    def parse(self, value: object) -> WrittenNumber:
+        amount = value if isinstance(value, WrittenNumber) else amount_of(value)
         if amount is None:
             raise self.refusal(value, "not a number with a known unit")
         if self.positive and amount.number <= 0.0:
@@ -88,8 +88,8 @@ class Quantity(Entry):
         return {"anyOf": [{"type": "number"}, {"type": "string"}]}
 
 
-AnyAmount = Annotated[Amount, Quantity()]
-PositiveAmount = Annotated[Amount, Quantity(positive=True)]
+AnyAmount = Annotated[WrittenNumber, SweptNumber()]
+PositiveAmount = Annotated[WrittenNumber, SweptNumber(positive=True)]
 Scale = Literal["linear", "log"]
 
 
@@ -97,7 +97,7 @@ class _Between(Section):
     """Base of a range between two ends, set by name since ``from`` is a Python keyword."""
 
     @property
-    def ends(self) -> tuple[Amount, Amount]:
+    def ends(self) -> tuple[WrittenNumber, WrittenNumber]:
         """First and last value, in the same unit."""
         return getattr(self, "from"), getattr(self, "to")  # noqa: B009
 

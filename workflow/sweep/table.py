@@ -13,8 +13,8 @@ from sa_solver.types import Array
 from workflow.runs.job import Finished
 from workflow.shell.dataset import unit_in
 from workflow.shell.tables import heading, write_table
-from workflow.sweep.design import Run
-from workflow.sweep.schema import Amount, amount_of
+from workflow.sweep.design import SweepRun
+from workflow.sweep.schema import WrittenNumber, amount_of
 
 DONE, FAILED = "done", "failed"
 # Results of an interface in wear runs, with units.
@@ -35,10 +35,10 @@ PATH = "states"
 
 
 @dataclass(frozen=True)
-class Row:
+class SweepRow:
     """One run: its values of the varied entries, how it ended, and its results."""
 
-    run: Run
+    run: SweepRun
     finished: Finished
 
     @property
@@ -116,7 +116,7 @@ class Varied:
         return heading(self.path, self.unit)
 
 
-def varied_in(rows: Sequence[Row]) -> list[Varied]:
+def varied_in(rows: Sequence[SweepRow]) -> list[Varied]:
     """Return the varied entries over the runs, as written."""
     return [_varied(path, [row.run.values[path] for row in rows]) for path in rows[0].run.values]
 
@@ -137,10 +137,12 @@ def _text(value: object) -> str:
         return " ".join(map(_text, value))
     if isinstance(value, bool):
         return str(value).lower()
-    return str(Amount(float(value)).written) if isinstance(value, int | float) else str(value)
+    return (
+        str(WrittenNumber(float(value)).written) if isinstance(value, int | float) else str(value)
+    )
 
 
-def columns_of(rows: Sequence[Row]) -> dict[str, Array]:
+def columns_of(rows: Sequence[SweepRow]) -> dict[str, Array]:
     """Return all results of the runs ``(runs,)``, by path; NaN where a run has none."""
     by_run = [row.numbers() for row in rows]
     names = dict.fromkeys(name for numbers in by_run for name in numbers)
@@ -150,7 +152,7 @@ def columns_of(rows: Sequence[Row]) -> dict[str, Array]:
     }
 
 
-def unit_of(name: str, rows: Sequence[Row]) -> str:
+def unit_of(name: str, rows: Sequence[SweepRow]) -> str:
     """Return the unit of a column of a wear run; "" for counts and ratios, and for other runs."""
     unit = WEAR_UNITS.get(name.partition(".")[2], "")
     if not unit:
@@ -163,7 +165,7 @@ def unit_of(name: str, rows: Sequence[Row]) -> str:
 # --- the file -----------------------------------------------------------------------------------
 
 
-def write_sweep_table(rows: Sequence[Row], path: Path) -> None:
+def write_sweep_table(rows: Sequence[SweepRow], path: Path) -> None:
     """Write the table as CSV: name, varied values, how the run ended, and its results.
 
     Numbers are in base units, with all their digits; cells of a run that failed are empty.

@@ -9,7 +9,7 @@ from pydantic_core import PydanticUndefined
 
 from workflow.case.sections import Section, entries_of
 from workflow.case.template import EDITORS
-from workflow.case.writing import Row, render
+from workflow.case.writing import EntryRow, render
 from workflow.sweep.schema import LogNormal, Normal, Range, SweepFile, Uniform
 
 SWEEP = "sweep"
@@ -28,13 +28,20 @@ def sweep_template() -> str:
     """Return a commented sweep of a case, with every way to vary an entry."""
     rows = {name: _row(SweepFile, name) for name in SweepFile.model_fields}
     rows["case"] = replace(rows["case"], value="my.yaml")
-    rows["set"] = replace(rows["set"], value=[Row("output.paraview", False)], off=True)
+    rows["set"] = replace(rows["set"], value=[EntryRow("output.paraview", False)], off=True)
     spaced = [replace(row, off=False) for row in _rows(Range)]
     vary = [
-        Row(FRICTION, [Row("values", [0.3, 0.4, 0.5], "one after the other")]),
-        Row(RADIUS, [Row("range", spaced, "evenly spaced")], "also: beside those above", off=True),
+        EntryRow(FRICTION, [EntryRow("values", [0.3, 0.4, 0.5], "one after the other")]),
+        EntryRow(
+            RADIUS,
+            [EntryRow("range", spaced, "evenly spaced")],
+            "also: beside those above",
+            off=True,
+        ),
         *(
-            Row(name, [Row("distribution", _rows(kind))], f"{sign}for design: sample", off=True)
+            EntryRow(
+                name, [EntryRow("distribution", _rows(kind))], f"{sign}for design: sample", off=True
+            )
             for name, kind, sign in DISTRIBUTED
         ),
     ]
@@ -42,12 +49,12 @@ def sweep_template() -> str:
     return HEADER + render(list(rows.values()))
 
 
-def _rows(model: type[Section]) -> list[Row]:
+def _rows(model: type[Section]) -> list[EntryRow]:
     return [_row(model, name) for name in entries_of(model)]
 
 
-def _row(model: type[Section], name: str) -> Row:
+def _row(model: type[Section], name: str) -> EntryRow:
     field = model.model_fields[name]
     value: Any = (field.examples or [None])[0]
     off = field.default is not PydanticUndefined and field.default is None
-    return Row(name, value, field.description or "", off)
+    return EntryRow(name, value, field.description or "", off)

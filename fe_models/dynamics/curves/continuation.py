@@ -59,7 +59,7 @@ class Refinement(Generic[L]):
         )
 
 
-class Recorder(Protocol[L, D]):
+class CurveRecorder(Protocol[L, D]):
     """Protocol of an observer that records points of a curve, and can request refined equations."""
 
     def describe(self, point: CurvePoint, at: L) -> D:
@@ -76,7 +76,7 @@ def follow(
     start: CurvePoint,
     span: tuple[float, float],
     control: ContinuationControl | None = None,
-    recorder: Recorder[L, D] | None = None,
+    recorder: CurveRecorder[L, D] | None = None,
     origin: Array | None = None,
     rounding: float = 0.0,
     end: float | None = None,
@@ -190,7 +190,7 @@ def _find_and_describe(
     span: tuple[float, float],
     scaling: Scaling,
     control: ContinuationControl,
-    recorder: Recorder[L, D] | None,
+    recorder: CurveRecorder[L, D] | None,
 ) -> tuple[CurvePoint, D | None] | str:
     """Return the next point with its description, or the reason why there is none."""
     following = _next_within_span(equations, point, span, scaling, control)

@@ -32,7 +32,7 @@ MAX_ITERATIONS = 30
 MAX_HALVINGS = 6
 
 
-class Trial(NamedTuple):
+class JointTrial(NamedTuple):
     """Trial displacements of the joints over a step, and their residual.
 
     Parameters
@@ -72,7 +72,7 @@ class JointEquilibrium:
         self._weight = float(np.diag(flexibility).max(initial=0.0))
         self._inverse: Array = np.empty((0, 0))
 
-    def solve(self, before: IncrementResponse, free: Array, largest: float) -> Trial:
+    def solve(self, before: IncrementResponse, free: Array, largest: float) -> JointTrial:
         """Return the best trial found, from the joint state after an earlier response.
 
         Parameters
@@ -99,7 +99,9 @@ class JointEquilibrium:
             at = improved
         return at
 
-    def _improved(self, state: Array, free: Array, at: Trial, scale: float) -> Trial | None:
+    def _improved(
+        self, state: Array, free: Array, at: JointTrial, scale: float
+    ) -> JointTrial | None:
         """Return a trial with a lower residual, or None if Newton's correction leads to none."""
         if self._size > SMALL_SIZE:
             correction = self._inverse @ at.residual
@@ -115,14 +117,14 @@ class JointEquilibrium:
                 return trial
         return None
 
-    def _trial(self, state: Array, free: Array, increment: Array, scale: float) -> Trial:
+    def _trial(self, state: Array, free: Array, increment: Array, scale: float) -> JointTrial:
         response = self._joints.respond(state, increment.reshape(-1, self._directions))
         force = response.force.ravel()
         residual = increment - free + self._flexibility @ force
         size = largest_entry(residual)
         scale = max(scale, self._weight * largest_entry(force))
         relative = size / scale if scale > 0.0 else size
-        return Trial(increment, response, residual, size, relative)
+        return JointTrial(increment, response, residual, size, relative)
 
     def _invert(self, tangent: Array) -> None:
         """Compute (1 + A T)⁻¹ for tangents ``(j, d, d)``."""

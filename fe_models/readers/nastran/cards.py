@@ -29,7 +29,7 @@ def fortran_real(text: str) -> float:
 
 
 @dataclass
-class Entry:
+class BulkEntry:
     """Bulk data entry: its line, its name, and its fields without continuation marks."""
 
     place: SourceLine
@@ -64,7 +64,7 @@ class Entry:
 class BulkData:
     """Entries of a file in their order, and the comments, which may contain names."""
 
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[BulkEntry] = field(default_factory=list)
     comments: list[str] = field(default_factory=list)
 
 
@@ -111,7 +111,7 @@ def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine
             yield from _lines(included, (*including, path))
 
 
-def _take(entries: list[Entry], place: SourceLine, line: str) -> None:
+def _take(entries: list[BulkEntry], place: SourceLine, line: str) -> None:
     """Add a line as a new entry, or as the continuation of the last one."""
     text = line if line.startswith("$") else line.partition("$")[0].rstrip()
     if not text:
@@ -128,7 +128,7 @@ def _take(entries: list[Entry], place: SourceLine, line: str) -> None:
             f"{place}: {head!r} is not an entry of Nastran bulk data; allowed: entries written "
             "out, such as GRID"
         )
-    entries.append(Entry(place, name, fields))
+    entries.append(BulkEntry(place, name, fields))
 
 
 def _divided(text: str) -> tuple[str, list[str], int]:
@@ -148,7 +148,7 @@ def _filled(fields: list[str], width: int) -> list[str]:
     return [""] * (-len(fields) % width)
 
 
-def summary_line(entry: Entry) -> str:
+def summary_line(entry: BulkEntry) -> str:
     """Return an entry in one line: its place in the file and its fields."""
     shown = ", ".join(text for text in entry.fields[:8])
     return (

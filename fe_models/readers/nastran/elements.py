@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from fe_models.readers.nastran.cards import Entry
+from fe_models.readers.nastran.cards import BulkEntry
 
 # Shape of the elements that are read, and their numbers of nodes of first and of second order;
 # corners come first.
@@ -50,7 +50,7 @@ REFUSED = (
 )  # fmt: skip
 
 
-def refuse(entry: Entry) -> None:
+def refuse(entry: BulkEntry) -> None:
     """Raise :class:`MeshError` for an entry that must not be ignored."""
     for pattern, reason in REFUSED:
         if re.fullmatch(pattern, entry.name):

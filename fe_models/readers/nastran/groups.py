@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from fe_models.readers.grouped import DIMENSION, FACE_SHAPES, FACES
-from fe_models.readers.nastran.cards import Entry
+from fe_models.readers.nastran.cards import BulkEntry
 from fe_models.readers.scope import Element, Scope, extend
 
 
@@ -18,7 +18,7 @@ class Groups:
     def __init__(self, scope: Scope) -> None:
         self.scope = scope
         self._facets = 0
-        self._handlers: dict[str, Callable[[Entry], None]] = {
+        self._handlers: dict[str, Callable[[BulkEntry], None]] = {
             "SPC1": self._held,
             "SPC": self._held_singly,
             "FORCE": self._forced,
@@ -28,34 +28,34 @@ class Groups:
             "PLOAD4": self._pressed,
         }
 
-    def read(self, entry: Entry) -> None:
+    def read(self, entry: BulkEntry) -> None:
         """Read an entry if it names a group."""
         if entry.name in self._handlers:
             self._handlers[entry.name](entry)
 
-    def _held(self, entry: Entry) -> None:
+    def _held(self, entry: BulkEntry) -> None:
         self._nodes(held_name(entry.text(0), entry.text(1)), _listed(entry, 2))
 
-    def _held_singly(self, entry: Entry) -> None:
+    def _held_singly(self, entry: BulkEntry) -> None:
         for first in (1, 4):
             if entry.text(first):
                 name = held_name(entry.text(0), entry.text(first + 1))
                 self._nodes(name, [entry.whole(first)])
 
-    def _forced(self, entry: Entry) -> None:
+    def _forced(self, entry: BulkEntry) -> None:
         self._nodes(f"{entry.name.lower()}_{entry.text(0)}", [entry.whole(1)])
 
-    def _surface(self, entry: Entry) -> None:
+    def _surface(self, entry: BulkEntry) -> None:
         for element in self._elements(_listed(entry, 1)):
             self._facet(entry, element.nodes)
 
-    def _surface_of_solids(self, entry: Entry) -> None:
+    def _surface_of_solids(self, entry: BulkEntry) -> None:
         for first in range(4, len(entry.fields), 4):
             if entry.text(first):
                 corners = [entry.whole(first + k) for k in (1, 2, 3)]
                 self._facet(entry, self._face(entry, entry.whole(first), corners))
 
-    def _pressed(self, entry: Entry) -> None:
+    def _pressed(self, entry: BulkEntry) -> None:
         """Add the face of a solid, given by its corners, or shells themselves."""
         numbers: list[int | range] = [entry.whole(1)]
         corners = []
@@ -77,7 +77,7 @@ class Groups:
                 if one in self.scope.elements:
                     yield self.scope.elements[one]
 
-    def _face(self, entry: Entry, number: int, corners: list[int]) -> tuple[int, ...]:
+    def _face(self, entry: BulkEntry, number: int, corners: list[int]) -> tuple[int, ...]:
         """Return the face of an element that has the corners."""
         if number not in self.scope.elements:
             raise entry.wrong(f"element {number} is not defined")
@@ -86,7 +86,7 @@ class Groups:
             raise entry.wrong(f"nodes {corners} are on no face of element {number}")
         return found[0]
 
-    def _facet(self, entry: Entry, nodes: tuple[int, ...]) -> None:
+    def _facet(self, entry: BulkEntry, nodes: tuple[int, ...]) -> None:
         self._facets -= 1
         self.scope.elements[self._facets] = Element(
             FACE_SHAPES[len(nodes)], nodes, (), entry.place, entry.name, stands_alone=False
@@ -105,7 +105,7 @@ def axes_of(components: str) -> str:
     return "".join(axis for axis, number in zip("xyz", "123", strict=True) if number in components)
 
 
-def _loaded(entry: Entry, element: Element, corners: list[int]) -> tuple[int, ...]:
+def _loaded(entry: BulkEntry, element: Element, corners: list[int]) -> tuple[int, ...]:
     """Return the corners of the face of an element on which a pressure acts.
 
     For a tetrahedron the second given corner is off the face. A quadrilateral is given by two
@@ -130,7 +130,7 @@ def _faces(element: Element) -> list[tuple[int, ...]]:
     return [tuple(element.nodes[k] for k in face) for face in FACES[element.shape]]
 
 
-def _listed(entry: Entry, first: int) -> list[int | range]:
+def _listed(entry: BulkEntry, first: int) -> list[int | range]:
     """Return the numbers from a field on, or a range ``a THRU b``."""
     if entry.text(first + 1).upper() == "THRU":
         return [range(entry.whole(first), entry.whole(first + 2) + 1)]

@@ -17,7 +17,7 @@ from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.abaqus.cards import SourceLine
 from fe_models.readers.flattened import FlatFile
 from fe_models.readers.grouped import CORNERS, GroupedMesh
-from fe_models.readers.nastran.cards import BulkData, Entry, bulk_data, summary_line
+from fe_models.readers.nastran.cards import BulkData, BulkEntry, bulk_data, summary_line
 from fe_models.readers.nastran.elements import BEAM, BEAMS, PLANES, SHELL, SHELLS, SOLIDS, refuse
 from fe_models.readers.nastran.groups import Groups
 from fe_models.readers.nastran.scene import scene_of
@@ -92,7 +92,7 @@ class _Read:
             groups.read(entry)
         self._note_shells(plane=not solids)
 
-    def _grid(self, entry: Entry) -> None:
+    def _grid(self, entry: BulkEntry) -> None:
         number = entry.whole(0)
         if number in self.scope.nodes:
             raise entry.wrong(f"node {number} is defined twice")
@@ -101,7 +101,7 @@ class _Read:
         x, y, z = self._placed(entry, system, place).tolist()
         self.scope.nodes[number] = (x, y, z)
 
-    def _placed(self, entry: Entry, system: int, place: Array) -> Array:
+    def _placed(self, entry: BulkEntry, system: int, place: Array) -> Array:
         """Return the coordinates in the basic system of a point given in a system."""
         if system == 0:
             return place
@@ -121,7 +121,7 @@ class _Read:
         axes /= np.linalg.norm(axes, axis=1)[:, None]
         return np.asarray(origin + _cartesian(card.name[-1], place) @ axes)
 
-    def _solid(self, entry: Entry) -> None:
+    def _solid(self, entry: BulkEntry) -> None:
         shape, counts = SOLIDS[entry.name]
         nodes = [text for text in entry.fields[2:] if text]
         if len(nodes) not in counts:
@@ -132,7 +132,7 @@ class _Read:
             entry, shape, [entry.whole(2 + k) for k in range(len(nodes))], "", self._set(entry)
         )
 
-    def _plane(self, entry: Entry) -> None:
+    def _plane(self, entry: BulkEntry) -> None:
         shape, count = (SHELLS | PLANES)[entry.name]
         # Angles and offsets follow the nodes and are not read.
         nodes = [
@@ -143,13 +143,13 @@ class _Read:
         name = self._set(entry)
         self._shells.setdefault(name, self._add(entry, shape, nodes, SHELL, name))
 
-    def _beam(self, entry: Entry) -> None:
+    def _beam(self, entry: BulkEntry) -> None:
         name = self._set(entry)
         ends = [entry.whole(2), entry.whole(3)]
         element = self._add(entry, "line", ends, BEAM, name, stands_alone=False)
         self._shells.setdefault(name, element)
 
-    def _set(self, entry: Entry) -> str:
+    def _set(self, entry: BulkEntry) -> str:
         """Return the name of an element's property.
 
         It gets a suffix if elements of another dimension have the property, too.
@@ -163,7 +163,7 @@ class _Read:
 
     def _add(
         self,
-        entry: Entry,
+        entry: BulkEntry,
         shape: str,
         nodes: list[int],
         advice: str,

@@ -13,7 +13,7 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.grouped import GroupedMesh
-from fe_models.readers.nastran.cards import Entry, summary_line
+from fe_models.readers.nastran.cards import BulkEntry, summary_line
 from fe_models.readers.nastran.elements import SOLIDS
 from fe_models.readers.nastran.groups import axes_of, held_name
 from fe_models.readers.scene import NotTakenError, SaidContact, SaidLoad, SaidSupport, Scene
@@ -22,7 +22,7 @@ from fe_models.readers.scene import NotTakenError, SaidContact, SaidLoad, SaidSu
 LOCAL = "along the axes of another coordinate system"
 
 
-def scene_of(entries: Sequence[Entry], mesh: GroupedMesh, left: Sequence[Entry]) -> Scene:
+def scene_of(entries: Sequence[BulkEntry], mesh: GroupedMesh, left: Sequence[BulkEntry]) -> Scene:
     """Return the scene of the entries.
 
     ``left`` are the entries that describe more than the mesh. Each is either used or ignored with a
@@ -32,9 +32,9 @@ def scene_of(entries: Sequence[Entry], mesh: GroupedMesh, left: Sequence[Entry])
 
 
 class _Reader:
-    def __init__(self, entries: Sequence[Entry], mesh: GroupedMesh) -> None:
+    def __init__(self, entries: Sequence[BulkEntry], mesh: GroupedMesh) -> None:
         self.mesh = mesh
-        self.of: dict[str, list[Entry]] = {}
+        self.of: dict[str, list[BulkEntry]] = {}
         for entry in entries:
             self.of.setdefault(entry.name, []).append(entry)
         # Grid points whose displacements are along the axes of another system.
@@ -42,10 +42,10 @@ class _Reader:
         self.contacts: list[SaidContact] = []
         self.supports: list[SaidSupport] = []
         self.loads: list[SaidLoad] = []
-        self.forces: dict[str, list[tuple[Entry, np.ndarray]]] = {}
-        self.pressures: dict[str, list[tuple[Entry, float]]] = {}
+        self.forces: dict[str, list[tuple[BulkEntry, np.ndarray]]] = {}
+        self.pressures: dict[str, list[tuple[BulkEntry, float]]] = {}
         self.ignored: list[str] = []
-        self._handlers: dict[str, Callable[[Entry], None]] = {
+        self._handlers: dict[str, Callable[[BulkEntry], None]] = {
             "SPC1": self._held,
             "SPC": self._held_singly,
             "FORCE": self._force,
@@ -58,7 +58,7 @@ class _Reader:
             "BSURFS": lambda _: None,
         }
 
-    def scene(self, left: Sequence[Entry]) -> Scene:
+    def scene(self, left: Sequence[BulkEntry]) -> Scene:
         for entry in left:
             handler = self._handlers.get(entry.name)
             try:
@@ -116,7 +116,7 @@ class _Reader:
             if any(np.isin(rows, cells).any() for _, cells in blocks):
                 yield name
 
-    def _pairs(self, entry: Entry) -> None:
+    def _pairs(self, entry: BulkEntry) -> None:
         for first in range(1, len(entry.fields), 8):
             if not entry.text(first):
                 continue
@@ -132,17 +132,17 @@ class _Reader:
 
     # --- supports and loads ---------------------------------------------------------------------
 
-    def _held(self, entry: Entry) -> None:
+    def _held(self, entry: BulkEntry) -> None:
         self._support(entry, entry.text(1))
 
-    def _held_singly(self, entry: Entry) -> None:
+    def _held_singly(self, entry: BulkEntry) -> None:
         for first in (1, 4):
             if entry.text(first):
                 if entry.real(first + 2) != 0.0:
                     raise NotTakenError("an imposed displacement: name a face, and impose it there")
                 self._support(entry, entry.text(first + 1))
 
-    def _support(self, entry: Entry, components: str) -> None:
+    def _support(self, entry: BulkEntry, components: str) -> None:
         axes = axes_of(components)
         group = held_name(entry.text(0), components)
         if not axes or group not in self.mesh.node_sets:
@@ -152,7 +152,7 @@ class _Reader:
         if all(support.group != group for support in self.supports):
             self.supports.append(SaidSupport(group, axes, entry.place.short))
 
-    def _force(self, entry: Entry) -> None:
+    def _force(self, entry: BulkEntry) -> None:
         if entry.text(2) not in ("", "0"):
             raise NotTakenError(LOCAL)
         vector = entry.real(3) * np.array([entry.real(k) for k in (4, 5, 6)])
@@ -168,7 +168,7 @@ class _Reader:
                 self.ignored.append(f"{place}: forces of {group} that differ: their sum is taken")
             yield SaidLoad("force", group, (x, y, z), (1.0,), place)
 
-    def _pressure(self, entry: Entry) -> None:
+    def _pressure(self, entry: BulkEntry) -> None:
         size = entry.real(2)
         other = [entry.real(k) for k in (3, 4, 5) if entry.text(k)]
         if any(value != size for value in other):
@@ -186,14 +186,14 @@ class _Reader:
                 continue
             yield SaidLoad("pressure", group, size, (1.0,), entry.place.short)
 
-    def _gravity(self, entry: Entry) -> None:
+    def _gravity(self, entry: BulkEntry) -> None:
         if entry.text(1) not in ("", "0"):
             raise NotTakenError(LOCAL)
         # Inertia forces on bodies are opposite to the acceleration of their frame.
         x, y, z = (-entry.real(2) * entry.real(k) for k in (3, 4, 5))
         self.loads.append(SaidLoad("acceleration", "", (x, y, z), (1.0,), entry.place.short))
 
-    def _rotation(self, entry: Entry) -> None:
+    def _rotation(self, entry: BulkEntry) -> None:
         if entry.text(2) not in ("", "0"):
             raise NotTakenError(LOCAL)
         point = self.mesh.points[self.mesh.numbers == (entry.whole(1) if entry.text(1) else 0)]
@@ -205,7 +205,7 @@ class _Reader:
         self.loads.append(SaidLoad("rotation", "", (x, y, z), (1.0,), entry.place.short, (a, b, c)))
 
 
-def _constants(entry: Entry) -> dict[str, float]:
+def _constants(entry: BulkEntry) -> dict[str, float]:
     """Return the constants of MAT1, which gives two of both moduli and Poisson's ratio."""
     young, shear, poisson = (entry.real(k) if entry.text(k) else None for k in (1, 2, 3))
     if poisson is None and young and shear:

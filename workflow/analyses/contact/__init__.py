@@ -9,7 +9,7 @@ from workflow.analyses.contact.case import BodiesCase, ContactCase, LineContactC
 from workflow.analyses.contact.memory import memory
 from workflow.analyses.contact.quantities import CURVES, main_results
 from workflow.analyses.contact.run_time import run_time
-from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary, expected
+from workflow.shell.analysis import Analysis, ChartComparison, Pictures, Run, Summary, expected
 
 if TYPE_CHECKING:
     import h5py
@@ -37,10 +37,10 @@ def _quantities(case: BodiesCase, summary: Summary) -> list[str]:
 
 
 def _pictures() -> Pictures:
-    from workflow.analyses.contact.datasets import Contents
+    from workflow.analyses.contact.datasets import ContactContents
     from workflow.analyses.contact.paraview import write_contact
 
-    return Pictures(_figures_of, write_contact, contents=Contents)
+    return Pictures(_figures_of, write_contact, contents=ContactContents)
 
 
 def _figures_of(contents: Any) -> Mapping[str, Callable[[h5py.File], Figure]]:
@@ -59,6 +59,6 @@ ANALYSIS: Analysis[BodiesCase] = Analysis(
     run_time=run_time,
     quantities=main_results,
     curves=CURVES,
-    comparison=Comparison(quantities=_quantities, at_the_end=AT_THE_END),
+    comparison=ChartComparison(quantities=_quantities, at_the_end=AT_THE_END),
     beside="files",
 )

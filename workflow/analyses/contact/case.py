@@ -26,7 +26,7 @@ from workflow.case.loading import word_at
 from workflow.case.plain import of_bodies, plain, shape_in_words
 from workflow.case.sections import (
     Case,
-    ElasticBody,
+    ElasticSection,
     Friction,
     GridCells,
     Length,
@@ -153,7 +153,7 @@ class Heights(Bodies):
         return read_heights(self.file)
 
 
-class BodyMaterial(ElasticBody):
+class BodyMaterial(ElasticSection):
     """Isotropic linear elastic material."""
 
     young: Stress = entry("Young's modulus [MPa]", "115 GPa")
@@ -190,14 +190,14 @@ def elastic(body: Body) -> ElasticMaterial:
 
 
 def unworn_contact(
-    shape: Section, bodies: Sequence[ElasticBody | str], load: float, line: bool
+    shape: Section, bodies: Sequence[ElasticSection | str], load: float, line: bool
 ) -> tuple[float, float] | None:
     """Return width [mm] and largest pressure [MPa] of a ball or cylinder, None for other shapes."""
     radius = getattr(shape, "radius", None)
     compliance = sum(
         (1.0 - body.elastic().poisson ** 2) / body.elastic().young
         for body in bodies
-        if isinstance(body, ElasticBody)
+        if isinstance(body, ElasticSection)
     )
     if radius is None or compliance == 0.0:
         return None

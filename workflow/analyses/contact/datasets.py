@@ -15,7 +15,7 @@ BODIES = "bodies"
 
 
 @dataclass(frozen=True)
-class Contents:
+class ContactContents:
     """Contents of ``results.h5`` of a contact case: a ``line`` contact or one over an area.
 
     ``increments`` is the number of computed increments, not of all in the path.

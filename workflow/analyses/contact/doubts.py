@@ -10,7 +10,7 @@ from sa_solver.types import Array
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.case.doubts import pressed
 from workflow.case.plain import plain
-from workflow.case.sections import ElasticBody
+from workflow.case.sections import ElasticSection
 
 # Shear below this share of the friction limit is hardly intended.
 HARDLY = 1e-3
@@ -21,10 +21,10 @@ ROUNDING = 1e-9
 
 
 def about_pressure(
-    path: str, pressure: float, bodies: Sequence[ElasticBody | str]
+    path: str, pressure: float, bodies: Sequence[ElasticSection | str]
 ) -> Iterator[str]:
     """Warn about the largest pressure [MPa] under the loads, compared with the bodies' strength."""
-    elastic = [body for body in bodies if isinstance(body, ElasticBody)]
+    elastic = [body for body in bodies if isinstance(body, ElasticSection)]
     limits = [getattr(body, "yield_stress", None) for body in elastic]
     yield from pressed(path, pressure, limits, [body.elastic().young for body in elastic])
 

@@ -12,14 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Grid
-from workflow.analyses.contact.datasets import BODIES, Contents
+from workflow.analyses.contact.datasets import BODIES, ContactContents
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
 from workflow.pictures.fields import (
     FLAT,
     MARGIN,
     MAX_PROFILES,
     PROFILE_MARGIN,
-    View,
+    FaceWindow,
     centres,
     draw_map,
     is_upright,
@@ -42,7 +42,7 @@ ARROWS = 17
 FEWEST_POINTS = 3
 
 
-def figures_of(contents: Contents) -> Figures:
+def figures_of(contents: ContactContents) -> Figures:
     """Return the figures of a run, by name."""
     return {
         "profiles": profiles,
@@ -125,7 +125,7 @@ def _loads(file: h5py.File, name: str) -> str:
     return f"{increment}: " + ", ".join(texts)
 
 
-def _view(file: h5py.File, names: list[str], margin: float = MARGIN) -> View:
+def _view(file: h5py.File, names: list[str], margin: float = MARGIN) -> FaceWindow:
     """Return the region in contact at these states, with a margin."""
     fields = [file["contact"][BODIES][name]["pressure"][()] for name in names]
     return view_of(fields, _grid(file), margin)
@@ -166,7 +166,7 @@ def _last_touching(file: h5py.File) -> str:
 
 
 def _draw_regions(
-    figure: Figure, axis: Axes, state: h5py.Group, grid: Grid, view: View, turned: bool
+    figure: Figure, axis: Axes, state: h5py.Group, grid: Grid, view: FaceWindow, turned: bool
 ) -> None:
     """Draw the regions of stick and slip, with the shear."""
     pressed, sticks = state["pressure"][()] > 0.0, state["sticking"][()].astype(bool)
@@ -184,7 +184,7 @@ def _draw_regions(
     )
 
 
-def _draw_arrows(axis: Axes, shear: Array, grid: Grid, view: View, turned: bool) -> None:
+def _draw_arrows(axis: Axes, shear: Array, grid: Grid, view: FaceWindow, turned: bool) -> None:
     """Draw the shear at places in view, ``ARROWS`` along its longer side."""
     apart = max(view.size) / ARROWS
     places = []

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import h5py
 
-from workflow.analyses.contact.datasets import BODIES, Contents
-from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
+from workflow.analyses.contact.datasets import BODIES, ContactContents
+from workflow.pictures.view import FIRST, PictureScene, Shown, View, write_view
 from workflow.pictures.vtk import (
     INCREMENTS,
     PROFILE,
@@ -32,7 +32,7 @@ VIEWS = {
 }
 
 
-def write_contact(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
+def write_contact(contents: ContactContents, file: h5py.File, folder: Path) -> list[Path]:
     """Write the faces, their series over the increments, and the script; return their paths."""
     written = write_series(folder / "contact.pvd", INCREMENTS, _faces(file, folder))
     states = file["contact"][BODIES].values()
@@ -43,7 +43,7 @@ def write_contact(contents: Contents, file: h5py.File, folder: Path) -> list[Pat
         for title, (name, unit) in VIEWS.items()
         if name == "pressure" or any(state[name][()].any() for state in states)
     ]
-    scene = Scene(str(file.attrs["title"]), INCREMENTS, last, views)
+    scene = PictureScene(str(file.attrs["title"]), INCREMENTS, last, views)
     return [*written, write_view(scene, folder / FIRST)]
 
 

@@ -6,7 +6,7 @@ from workflow.analyses.contact.case import BodiesCase
 from workflow.analyses.contact.datasets import LOADS, RIGID_MOTIONS
 from workflow.shell.analysis import Summary
 from workflow.shell.dataset import unit_in
-from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.summary import estimate, told
 
 LAST, LOOP = "after the last increment", "last closed cycle"
@@ -53,15 +53,15 @@ CURVES = (
 )
 
 
-def main_results(case: BodiesCase, summary: Summary) -> list[Quantity]:
+def main_results(case: BodiesCase, summary: Summary) -> list[SummaryQuantity]:
     """Return the main results of the last state and cycle, with the error of each by increments."""
     last, loop = summary["states"][-1], summary["loop"] or {}
     line = "contact_half_width" in last
 
-    def of(text: str, path: str, unit: str, where: str = LAST) -> Quantity:
+    def of(text: str, path: str, unit: str, where: str = LAST) -> SummaryQuantity:
         place = "loop" if where == LOOP else "last"
         error = f"increments_error.{place}.{path.rpartition('.')[2]}"
-        return Quantity(where, text, path, unit, **estimate(summary, error, BY_INCREMENTS))
+        return SummaryQuantity(where, text, path, unit, **estimate(summary, error, BY_INCREMENTS))
 
     quantities = [
         of(f"{LOADS[name][1]}, {name}", f"states.-1.{name}", unit_in(line, LOADS[name][0]))

@@ -16,7 +16,7 @@ from workflow.analyses.contact.datasets import (
     BODIES,
     LOADS,
     RIGID_MOTIONS,
-    Contents,
+    ContactContents,
     traction_fields,
 )
 from workflow.analyses.contact.load_table import LoadTable
@@ -30,7 +30,7 @@ from workflow.analyses.contact.summary import (
 from workflow.case.plain import counted
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset, described
-from workflow.shell.results import Along, On, run_results
+from workflow.shell.results import CurveAxis, On, run_results
 from workflow.shell.summary import finish
 
 ContactRun = Run[BodiesCase]
@@ -70,8 +70,8 @@ def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
     finish(run, summary, _lines(summary, outcome.grid))
 
 
-def _contents(outcome: ContactOutcome) -> Contents:
-    return Contents(outcome.grid.line, len(outcome.history.states))
+def _contents(outcome: ContactOutcome) -> ContactContents:
+    return ContactContents(outcome.grid.line, len(outcome.history.states))
 
 
 def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
@@ -85,7 +85,7 @@ def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
         writer.put(f"surfaces/{BODIES}", {"height": height}, On(f"grid/{BODIES}"))
         writer.put("path", _path(outcome.table))
         method = {"method": history.method, "reason": history.reason, "parts": history.parts}
-        writer.put("history", _columns(history, friction), Along("increment"), **method)
+        writer.put("history", _columns(history, friction), CurveAxis("increment"), **method)
         for index, state in zip(history.indices, history.states, strict=True):
             place = f"contact/{BODIES}/{index + 1:05d}"
             fields = _fields(state, friction)

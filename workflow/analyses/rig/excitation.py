@@ -32,7 +32,7 @@ RECORDED = {
 }
 
 
-class Drive(Section):
+class PrescribedMotion(Section):
     """An alternating displacement imposed on the joint."""
 
     stroke: Length = entry("of the joint, peak to peak [mm]", "14 um")

@@ -64,7 +64,7 @@ class Exponential(Section):
     second_rate: PerEnergy = entry("of the second exponential [1/(N*mm)]", "5 1/kJ", default=0.0)
 
 
-class Points(Table):
+class FactorTable(Table):
     """A table of factors."""
 
     kind: Literal["table"] = entry("factors against energies", "table")
@@ -74,7 +74,7 @@ class Points(Table):
 
 
 Factor = Annotated[
-    Logarithmic | Arrhenius | Linear | Exponential | Points, Field(discriminator="kind")
+    Logarithmic | Arrhenius | Linear | Exponential | FactorTable, Field(discriminator="kind")
 ]
 
 
@@ -83,7 +83,7 @@ def _unfit(worn: WearCase) -> str:
     return "" if worn.loops.wanted else "leaves no table of loops; give loops.amplitude or force"
 
 
-class JointEvolution(Section):
+class EvolutionSection(Section):
     """Factors of the joint's parameters against the energy E that it has dissipated so far."""
 
     friction: Factor | None = entry("of joint.friction", default=None)
@@ -101,14 +101,14 @@ class JointEvolution(Section):
     )
 
     @model_validator(mode="after")
-    def _file_stands_alone(self) -> JointEvolution:
+    def _file_stands_alone(self) -> EvolutionSection:
         for key in ("friction", "stiffness"):
             if self.file is not None and getattr(self, key) is not None:
                 raise disagreement(f"given beside {key}; allowed: one of them", "file", key)
         return self
 
     @model_validator(mode="after")
-    def _file_is_of_a_whole_joint(self) -> JointEvolution:
+    def _file_is_of_a_whole_joint(self) -> EvolutionSection:
         if self.file is None or not self.file.endswith(".csv"):
             return self
         # Imported here to avoid a cycle: that module reads units, which belong to this package.

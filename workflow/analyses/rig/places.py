@@ -12,13 +12,13 @@ NEXT = "next "
 Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
-class Points(Section):
+class KeptPoints(Section):
     """Kept points of a reduced body."""
 
     points: Title = entry("one, such as pad 17, or all of a kind, such as pad", "pad")
 
 
-class Moved(Points):
+class Moved(KeptPoints):
     """Kept points of a reduced body, and a direction."""
 
     direction: Direction = entry("x, y, z, -x, -y or -z", "x")

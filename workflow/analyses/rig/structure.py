@@ -17,7 +17,7 @@ from workflow.analyses.rig.joint_sections import (
     RowLaw,
     VibrationLaw,
 )
-from workflow.analyses.rig.places import Against, Direction, Moved, Points
+from workflow.analyses.rig.places import Against, Direction, KeptPoints, Moved
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.case.fields import Quantity, Whole, shown
 from workflow.case.input_files import InputFileError, open_hdf5
@@ -150,7 +150,7 @@ class Rig(RowOfMasses):
         return f"{super().text}{joints}"
 
 
-class AddedMass(Points):
+class AddedMass(KeptPoints):
     """A mass that points share evenly."""
 
     mass: Mass = entry("of all of them together [t]", "1.2 kg")

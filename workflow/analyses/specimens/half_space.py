@@ -30,7 +30,7 @@ from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact, NormalState
 from sa_solver.tangential.contact import TangentialContact, TangentialState
 from sa_solver.types import Array, ElasticPair, Grid, Indices
-from wear.contact.link import Link, fitted
+from wear.contact.link import StructureLink, fitted
 from workflow.errors import MethodFailed
 
 # For a tied pad: any motion, and a limit that no shear reaches.
@@ -159,7 +159,9 @@ class PadHalfSpace:
             misfit=pressed.residual,
         )
 
-    def _linked(self, pair: ReducedPair, normal: NormalSolution, forces: Array, axis: int) -> Link:
+    def _linked(
+        self, pair: ReducedPair, normal: NormalSolution, forces: Array, axis: int
+    ) -> StructureLink:
         """Return the link for nodal ``forces`` ``(t, n)`` along one axis, where ``normal`` presses.
 
         Pressure and shear are not coupled: for shear, only the part along the face is used.

@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
+from workflow.pictures.view import FIRST, PictureScene, Shown, View, write_view
 from workflow.pictures.vtk import CYCLES, Fields, Step, attach, write_series
 from workflow.shell.results import frame_of
 
@@ -69,5 +69,5 @@ def _write_view(file: h5py.File, folder: Path) -> Path:
         View("Contact pressure", [Shown(series, "pressure [MPa]")]),
         View("Slip in a cycle", [Shown(series, "cycle_slip [mm]")]),
     ]
-    scene = Scene(str(file.attrs["title"]), CYCLES, last, views)
+    scene = PictureScene(str(file.attrs["title"]), CYCLES, last, views)
     return write_view(scene, folder / FIRST)

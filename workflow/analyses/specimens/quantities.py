@@ -8,7 +8,7 @@ from functools import partial
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.wear.layout import MOMENTS
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.summary import estimate, told
 
 FREE = "free specimens"
@@ -47,7 +47,7 @@ CURVES = (
 )
 
 
-def main_results(case: SpecimensCase, summary: Summary) -> list[Quantity]:
+def main_results(case: SpecimensCase, summary: Summary) -> list[SummaryQuantity]:
     """Return results under every normal force, and the first frequency of either specimen."""
     quantities = [
         quantity
@@ -55,15 +55,17 @@ def main_results(case: SpecimensCase, summary: Summary) -> list[Quantity]:
         for quantity in _under(f"under {force:g} N", number, summary)
     ]
     quantities += [
-        Quantity(FREE, f"first natural frequency of body {n}", f"frequencies.body_{n}.full.0", "Hz")
+        SummaryQuantity(
+            FREE, f"first natural frequency of body {n}", f"frequencies.body_{n}.full.0", "Hz"
+        )
         for n in (1, 2)
     ]
     return told(summary, quantities)
 
 
-def _under(group: str, number: int, summary: Summary) -> Iterator[Quantity]:
+def _under(group: str, number: int, summary: Summary) -> Iterator[SummaryQuantity]:
     """Yield results under one normal force."""
-    of, load = partial(Quantity, group), f"loads.{number}"
+    of, load = partial(SummaryQuantity, group), f"loads.{number}"
     for body in (1, 2):
         yield of(f"largest depth worn from body {body}", f"{load}.depths.{body - 1}", "mm")
     for body in (1, 2):

@@ -31,7 +31,7 @@ from workflow.analyses.wear.datasets import cycles_column, face_mesh, kinetics_c
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset, described
 from workflow.shell.reporter import Reporter
-from workflow.shell.results import Along, On, ResultsWriter, run_results
+from workflow.shell.results import CurveAxis, On, ResultsWriter, run_results
 from workflow.shell.store import replacing_hdf5
 from workflow.shell.summary import finish
 
@@ -114,7 +114,7 @@ def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
 
 def _put_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array) -> None:
     writer.put(group, {}, normal_force=load.force, unit="N")
-    writer.put(f"{group}/kinetics", _kinetics(load.blocks, areas), Along("cycles"))
+    writer.put(f"{group}/kinetics", _kinetics(load.blocks, areas), CurveAxis("cycles"))
     for number, kept in enumerate(load.kept):
         name, loop = f"{group}/states/{number:05d}", masing_loop(kept.curve)
         numbers = {"cycles": kept.block.cycles, "energy": kept.block.energy}

@@ -19,9 +19,9 @@ def _run(run: Run[JointCase | RigCase]) -> None:
 def _pictures() -> Pictures:
     # Imported here, as plotting takes a second to load.
     from workflow.analyses.time.figures import figures_of
-    from workflow.analyses.time.outcome import Contents
+    from workflow.analyses.time.outcome import MotionContents
 
-    return Pictures(figures_of, contents=Contents)
+    return Pictures(figures_of, contents=MotionContents)
 
 
 ANALYSIS = Analysis(

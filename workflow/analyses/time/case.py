@@ -10,8 +10,15 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from workflow.analyses.rig.doubts import AWAY, RIGID, about_matrices, about_modes
-from workflow.analyses.rig.excitation import Drive, Excitation, Hammer, Harmonic, Recorded, Time
-from workflow.analyses.rig.joint_evolution import JointEvolution
+from workflow.analyses.rig.excitation import (
+    Excitation,
+    Hammer,
+    Harmonic,
+    PrescribedMotion,
+    Recorded,
+    Time,
+)
+from workflow.analyses.rig.joint_evolution import EvolutionSection
 from workflow.analyses.rig.joint_sections import (
     ContactLaw,
     ElasticJoint,
@@ -98,7 +105,7 @@ class Integration(Section):
     )
 
 
-class Reported(Section):
+class ReportedValue(Section):
     """A value that a source reports, shown next to the computed one without any requirement."""
 
     quantity: DottedPath = entry("path into summary.json", "states.-1.friction")
@@ -115,8 +122,8 @@ class TimeCase(Case):
     analysis: Literal["time"] = entry("what is computed", "time")
     structure: Section = entry("what holds the joint")
     joint: Joint = entry("its law, and the parameters that it begins with")
-    evolution: JointEvolution = entry(
-        "of the parameters with dissipated energy; without it none", default=JointEvolution()
+    evolution: EvolutionSection = entry(
+        "of the parameters with dissipated energy; without it none", default=EvolutionSection()
     )
     energies: tuple[TotalEnergy, ...] = entry(
         "dissipated so far, ascending, at which the joint is looked at [N*mm]",
@@ -127,7 +134,9 @@ class TimeCase(Case):
     output: OutputWithoutFields = entry(
         "files beside summary and results", default=OutputWithoutFields()
     )
-    reported: tuple[Reported, ...] = entry("values to be told beside those computed", default=())
+    reported: tuple[ReportedValue, ...] = entry(
+        "values to be told beside those computed", default=()
+    )
 
     @model_validator(mode="after")
     def _evolves_what_there_is(self) -> TimeCase:
@@ -153,7 +162,7 @@ class JointCase(TimeCase):
 
     structure: SingleJoint = entry("what holds the joint: nothing but its drive")
     joint: JointLaw = entry("its law, and the parameters that it begins with")
-    drive: Drive = entry("motion that is imposed on the joint")
+    drive: PrescribedMotion = entry("motion that is imposed on the joint")
     ageing: Ageing = entry("how long it is driven")
 
     @model_validator(mode="after")

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.time.outcome import LOOP, MOTION, RESPONSE, RING_DOWN, Contents
+from workflow.analyses.time.outcome import LOOP, MOTION, RESPONSE, RING_DOWN, MotionContents
 from workflow.pictures.panels import (
     Figures,
     legend_below,
@@ -52,7 +52,7 @@ LARGE_ENERGY = 1e3
 MOST_POINTS = 20_000
 
 
-def figures_of(contents: Contents) -> Figures:
+def figures_of(contents: MotionContents) -> Figures:
     """Return the figures of a run, by name."""
     groups = contents.curves
     drawn = {
@@ -68,7 +68,9 @@ def figures_of(contents: Contents) -> Figures:
     }
 
 
-def _states(file: h5py.File, contents: Contents, group: str) -> list[tuple[str, Any, h5py.Group]]:
+def _states(
+    file: h5py.File, contents: MotionContents, group: str
+) -> list[tuple[str, Any, h5py.Group]]:
     """Return label, colour and curves of the states that have a group; of many states, some."""
     states = file["states"]
     return [
@@ -89,7 +91,7 @@ def _label(state: h5py.Group, aged: bool) -> str:
 # --- loops and evolution ------------------------------------------------------------------------
 
 
-def loops(file: h5py.File, contents: Contents) -> Figure:
+def loops(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw force against displacement of the joint over a closed cycle, at several energies."""
     shown = _states(file, contents, LOOP)
     figure = new_figure(_loops_title([_area(loop) for _, _, loop in shown]), 7.0)
@@ -114,7 +116,7 @@ def _area(loop: h5py.Group) -> float:
     return float(abs(np.trapezoid(loop["force"][()], loop["displacement"][()])))
 
 
-def evolution(file: h5py.File, contents: Contents) -> Figure:
+def evolution(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw the parameters that change over the dissipated energy, and below them the cycles."""
     group = file["evolution"]
     present = [name for name in SHOWN if name in contents.evolution]
@@ -172,7 +174,7 @@ def _evolution_title(group: h5py.Group, panels: list[str], aged: bool) -> str:
 # --- hammer blows -------------------------------------------------------------------------------
 
 
-def frequency_response(file: h5py.File, contents: Contents) -> Figure:
+def frequency_response(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw acceleration over force: over all frequencies, and the first mode enlarged."""
     shown = _states(file, contents, RESPONSE)
     figure = new_figure(_response_title(shown), 8.5)
@@ -222,7 +224,7 @@ def _response_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
 LEAST_SOFTENING, LEAST_DAMPING = 0.1, 0.1
 
 
-def ring_down(file: h5py.File, contents: Contents) -> Figure:
+def ring_down(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw frequency and damping of the first mode against its amplitude, and the motion itself."""
     shown = _states(file, contents, MOTION)
     figure = new_figure("First mode of the ring-down against its amplitude", 9.0)
@@ -270,7 +272,7 @@ def _faded(moved: h5py.Group) -> int:
 # --- forces -------------------------------------------------------------------------------------
 
 
-def motion(file: h5py.File, contents: Contents) -> Figure:
+def motion(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw force, displacement and the energy that the joint has dissipated, over time."""
     shown = _states(file, contents, MOTION)
     figure = new_figure("Motion of the rig under its excitation", 9.0)

@@ -9,7 +9,7 @@ from typing import Any
 from sa_solver.types import Array
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.shell.dataset import Dataset, Datasets
-from workflow.shell.results import Along
+from workflow.shell.results import CurveAxis
 
 # The parameters of a joint that evolve, in the order of reports.
 PARAMETERS = {
@@ -23,9 +23,9 @@ LOOP, MOTION, RESPONSE, RING_DOWN = "loop", "motion", "frequency_response", "rin
 # First axis of each group; loops have none.
 ALONG = {
     LOOP: None,
-    MOTION: Along("time"),
-    RESPONSE: Along("frequency"),
-    RING_DOWN: Along("amplitude"),
+    MOTION: CurveAxis("time"),
+    RESPONSE: CurveAxis("frequency"),
+    RING_DOWN: CurveAxis("amplitude"),
 }
 
 
@@ -60,7 +60,7 @@ class TimeOutcome:
     seen: tuple[str, ...] = ()
 
     @property
-    def contents(self) -> Contents:
+    def contents(self) -> MotionContents:
         """Description of what ``results.h5`` holds of this outcome."""
         curves: dict[str, tuple[str, ...]] = {}
         for number, state in enumerate(self.states):
@@ -68,11 +68,11 @@ class TimeOutcome:
                 curves[group] = (*curves.get(group, ()), f"{number:05d}")
         changes = len(self.evolution["energy"].values) > 1
         evolution = tuple(self.evolution) if changes else ()
-        return Contents(curves, evolution, aged=self.states[0].cycles is not None)
+        return MotionContents(curves, evolution, aged=self.states[0].cycles is not None)
 
 
 @dataclass(frozen=True)
-class Contents:
+class MotionContents:
     """Contents of ``results.h5`` of a case in time.
 
     ``curves`` are the states that have each group of curves. ``evolution`` are the columns over the

@@ -9,7 +9,7 @@ from typing import Any
 from workflow.analyses.time.case import JointCase, RigCase, joules
 from workflow.analyses.time.outcome import PARAMETERS
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.summary import estimate, told
 
 AGEING, IN_TIME = "jumps in energy, a bound", "displacement, by the steps in time"
@@ -59,18 +59,18 @@ CURVES = (
 )
 
 
-def main_results(case: JointCase | RigCase, summary: Summary) -> list[Quantity]:
+def main_results(case: JointCase | RigCase, summary: Summary) -> list[SummaryQuantity]:
     """Return results of every state, and of the whole life if the joint ages."""
     whole = (
-        Quantity("whole life", "cycles", "cycles", "1"),
-        Quantity("whole life", "energy dissipated", "energy", "N mm", **_of_ageing(summary)),
+        SummaryQuantity("whole life", "cycles", "cycles", "1"),
+        SummaryQuantity("whole life", "energy dissipated", "energy", "N mm", **_of_ageing(summary)),
     )
     states = (
         quantity
         for number in range(len(summary["states"]))
         for quantity in _of_state(number, _when(number, summary), summary)
     )
-    rig = Quantity("rig without its joints", "first natural frequency", "free.0", "Hz")
+    rig = SummaryQuantity("rig without its joints", "first natural frequency", "free.0", "Hz")
     return told(summary, [*whole, *states, rig])
 
 
@@ -88,8 +88,8 @@ def _when(number: int, summary: Summary) -> str:
     return "at the end" if ends else f"at {joules(summary['states'][number]['energy'])}"
 
 
-def _of_state(number: int, when: str, summary: Summary) -> Iterator[Quantity]:
-    of, place = partial(Quantity, when), f"states.{number}"
+def _of_state(number: int, when: str, summary: Summary) -> Iterator[SummaryQuantity]:
+    of, place = partial(SummaryQuantity, when), f"states.{number}"
     in_time = estimate(summary, f"{place}.step_error", IN_TIME)
     for name, (unit, text, everyday) in NUMBERS.items():
         known = in_time if name in MOVED else {}

@@ -11,7 +11,7 @@ from workflow.case.fields import in_unit_of
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
-from workflow.shell.results import Along, run_results
+from workflow.shell.results import CurveAxis, run_results
 from workflow.shell.summary import finish, number_at
 from workflow.shell.tables import write_curves
 
@@ -39,7 +39,7 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
     attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": outcome.seen or None}
     with run_results(run, case, attributes) as writer:
         writer.put_contents(outcome.contents)
-        writer.put(EVOLUTION, outcome.evolution, Along("energy"))
+        writer.put(EVOLUTION, outcome.evolution, CurveAxis("energy"))
         for number, state in enumerate(outcome.states):
             place = f"states/{number:05d}"
             scalars = {k: v for k, v in state.numbers.items() if isinstance(v, int | float | list)}

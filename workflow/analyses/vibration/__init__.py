@@ -6,7 +6,7 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.memory import memory
 from workflow.analyses.vibration.quantities import CURVES, main_results
 from workflow.analyses.vibration.run_time import run_time
-from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary
+from workflow.shell.analysis import Analysis, ChartComparison, Pictures, Run, Summary
 
 __all__ = ["ANALYSIS"]
 
@@ -30,10 +30,10 @@ def _quantities(case: VibrationCase, summary: Summary) -> list[str]:
 def _pictures() -> Pictures:
     # Imported here, as plotting takes a second to load.
     from workflow.analyses.vibration.figures.response import figures_of
-    from workflow.analyses.vibration.outcome import Contents
+    from workflow.analyses.vibration.outcome import VibrationContents
     from workflow.analyses.vibration.paraview import write_vibration
 
-    return Pictures(figures_of, write_vibration, contents=Contents)
+    return Pictures(figures_of, write_vibration, contents=VibrationContents)
 
 
 ANALYSIS = Analysis(
@@ -46,5 +46,5 @@ ANALYSIS = Analysis(
     quantities=main_results,
     curves=CURVES,
     resumable=True,
-    comparison=Comparison(quantities=_quantities),
+    comparison=ChartComparison(quantities=_quantities),
 )

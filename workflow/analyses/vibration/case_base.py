@@ -24,7 +24,7 @@ from workflow.analyses.rig.structure import (
     refuse_own_joints,
     refuse_undriven,
 )
-from workflow.analyses.vibration.excitation import FORCE, LEVEL, Amount, VibrationExcitation
+from workflow.analyses.vibration.excitation import FORCE, LEVEL, ExcitationSize, VibrationExcitation
 from workflow.analyses.vibration.sections import Continuation, MotionResolution
 from workflow.case.fields import Quantity
 from workflow.case.plain import shares
@@ -128,7 +128,7 @@ class VibrationCaseBase(Case):
         return check_places(self.structure, self.excitation, highest, joint, mass, ring, order)
 
     @property
-    def amount(self) -> Amount:
+    def amount(self) -> ExcitationSize:
         """Quantity along which motions are followed: a force, or the level of an excitation."""
         return FORCE if self.excitation is None else LEVEL
 

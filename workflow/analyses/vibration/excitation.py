@@ -36,7 +36,7 @@ NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
-class Amount:
+class ExcitationSize:
     """Factor of the excitation, with its ``name``, ``unit`` and ``description``."""
 
     name: str
@@ -57,11 +57,11 @@ class Amount:
         return f"{'under' if self.unit == 'N' else 'at'} {self.told(number)}"
 
 
-FORCE = Amount("force", "N", "amplitude of the force")
-LEVEL = Amount("level", "1", "level by which the excitation is multiplied")
+FORCE = ExcitationSize("force", "N", "amplitude of the force")
+LEVEL = ExcitationSize("level", "1", "level by which the excitation is multiplied")
 
 
-def amount_in(numbers: Mapping[str, Any]) -> tuple[Amount, float]:
+def amount_in(numbers: Mapping[str, Any]) -> tuple[ExcitationSize, float]:
     """Return the kind of factor, force or level, and its value, from numbers of a response."""
     amount = FORCE if FORCE.name in numbers else LEVEL
     return amount, float(numbers[amount.name])

@@ -17,7 +17,7 @@ from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.vibration.excitation import (
     FORCE,
     LEVEL,
-    Amount,
+    ExcitationSize,
     GroundDisplacement,
     VibrationExcitation,
     waves_of,
@@ -57,7 +57,7 @@ class Driving:
 
     load: PeriodicLoad
     ground: tuple[MovingGround, ...] = ()
-    amount: Amount = FORCE
+    amount: ExcitationSize = FORCE
     left_out: tuple[float, ...] = ()
 
     def absolute(self, motion: HarmonicSolution) -> HarmonicSolution:

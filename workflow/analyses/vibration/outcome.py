@@ -111,11 +111,11 @@ class VibrationOutcome:
         return shares[0].shape[1] if any(share.any() for share in shares) else 0
 
     @property
-    def contents(self) -> Contents:
+    def contents(self) -> VibrationContents:
         """Description of what ``results.h5`` holds of this outcome."""
         names = [f"{number:05d}" for number in range(len(self.responses))]
         loops = (n for n, response in zip(names, self.responses, strict=True) if response.loops)
-        return Contents(
+        return VibrationContents(
             responses=tuple(names),
             loops=tuple(loops),
             places=self.contact is not None,
@@ -129,7 +129,7 @@ class VibrationOutcome:
 
 
 @dataclass(frozen=True)
-class Contents:
+class VibrationContents:
     """Contents of ``results.h5`` of a vibration case.
 
     ``responses`` are the groups by force, ``loops`` the groups that have loops. ``places`` tells

@@ -20,9 +20,9 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.vibration.excitation import amount_in
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import VibrationContents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
-from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
+from workflow.pictures.view import FIRST, PictureScene, Shown, View, write_view
 from workflow.pictures.vtk import SECONDS, Fields, Step, attach, quadrilaterals, write_series
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ MOST_STEPS = 48
 TO_FRAME = np.array([1.0, 1.0, -1.0])
 
 
-def write_vibration(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
+def write_vibration(contents: VibrationContents, file: h5py.File, folder: Path) -> list[Path]:
     """Write the cycle of every force and the script, and return the paths.
 
     Writes nothing where joints have no places.
@@ -49,7 +49,7 @@ def write_vibration(contents: Contents, file: h5py.File, folder: Path) -> list[P
     return [*written, _write_view(contents, file, folder)]
 
 
-def _write_view(contents: Contents, file: h5py.File, folder: Path) -> Path:
+def _write_view(contents: VibrationContents, file: h5py.File, folder: Path) -> Path:
     """Write the script that shows the cycle under the largest force, and return its path."""
     largest = max(contents.responses, key=lambda n: amount_in(file["responses"][n].attrs)[1])
     series, motion = f"cycle_{largest}.pvd", "vibration [mm]"
@@ -57,7 +57,7 @@ def _write_view(contents: Contents, file: h5py.File, folder: Path) -> Path:
         View("Contact pressure", [Shown(series, "pressure [MPa]", motion)]),
         View("Vibration", [Shown(series, motion, motion)]),
     ]
-    scene = Scene(str(file.attrs["title"]), SECONDS, 0.0, views)
+    scene = PictureScene(str(file.attrs["title"]), SECONDS, 0.0, views)
     return write_view(scene, folder / FIRST)
 
 

@@ -10,7 +10,7 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.excitation import LEVEL, amount_in, under_in
 from workflow.analyses.vibration.outcome import AT, MODES
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.summary import estimate, told
 
 LINEAR, RECORDS = "linear limits", "left_out_of_records"
@@ -68,14 +68,16 @@ CURVES = (
 )
 
 
-def main_results(case: VibrationCase, summary: Summary) -> list[Quantity]:
+def main_results(case: VibrationCase, summary: Summary) -> list[SummaryQuantity]:
     """Return results of all responses, their finest loops, and the limits stuck and sliding."""
     limits = (
-        Quantity(LINEAR, f"first natural frequency, joints {state}", f"{state}.0", "Hz")
+        SummaryQuantity(LINEAR, f"first natural frequency, joints {state}", f"{state}.0", "Hz")
         for state in ("stuck", "sliding", "free")
     )
     records = (
-        Quantity("excitation", f"left out of record {number + 1}", f"{RECORDS}.{number}", "1")
+        SummaryQuantity(
+            "excitation", f"left out of record {number + 1}", f"{RECORDS}.{number}", "1"
+        )
         for number in range(len(summary.get(RECORDS, ())))
     )
     responses = (
@@ -97,7 +99,7 @@ def main_results(case: VibrationCase, summary: Summary) -> list[Quantity]:
 
 def of_response(
     group: str, path: str, response: Mapping[str, Any], summary: Summary
-) -> Iterator[Quantity]:
+) -> Iterator[SummaryQuantity]:
     """Yield results of the response to a force or level, at a ``path`` of the summary."""
     numbers = NUMBERS | {name: told for name, told in BESIDE.items() if name in response}
     if amount_in(response)[0] is LEVEL:
@@ -105,18 +107,18 @@ def of_response(
     return _of(group, path, numbers, WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
 
 
-def _of_loop(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
+def _of_loop(group: str, path: str, summary: Summary) -> Iterator[SummaryQuantity]:
     return _of(group, path, LOOP, LOOP_WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
 
 
-def _of_mode(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
+def _of_mode(group: str, path: str, summary: Summary) -> Iterator[SummaryQuantity]:
     error = estimate(summary, f"{path}.error", ERROR)
     return _of(group, path, MODE, ("most_damped",), error)
 
 
 def _of_answers(
     group: str, path: str, response: Mapping[str, Any], summary: Summary
-) -> Iterator[Quantity]:
+) -> Iterator[SummaryQuantity]:
     """Yield results of motions at the frequencies of the case, of each one that coexists."""
     for place, answer in enumerate(response.get(AT, ())):
         count = len(answer["motions"])
@@ -139,8 +141,8 @@ def _of(
     numbers: Mapping[str, tuple[str, str, str]],
     with_error: tuple[str, ...],
     error: Mapping[str, Any],
-) -> Iterator[Quantity]:
-    of = partial(Quantity, group)
+) -> Iterator[SummaryQuantity]:
+    of = partial(SummaryQuantity, group)
     for name, (unit, text, everyday) in numbers.items():
         known = error if name in with_error else {}
         yield of(text, f"{path}.{name}", unit, everyday=everyday, **known)

@@ -7,7 +7,7 @@ from math import degrees, pi
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.excitation import Amount
+from workflow.analyses.vibration.excitation import ExcitationSize
 from workflow.analyses.vibration.harmonics import CURVE, write_harmonics
 from workflow.analyses.vibration.outcome import (
     AT,
@@ -31,7 +31,7 @@ from workflow.analyses.vibration.stability import bifurcation_datasets, columns_
 from workflow.case.plain import counted
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
-from workflow.shell.results import Along, ResultsWriter, run_results
+from workflow.shell.results import CurveAxis, ResultsWriter, run_results
 from workflow.shell.summary import finish
 from workflow.shell.tables import DIGITS, heading, write_curves, write_table
 
@@ -63,13 +63,13 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
     }
     with run_results(run, case, attributes) as writer:
         writer.put_contents(outcome.contents)
-        along = Along(case.amount.name)
+        along = CurveAxis(case.amount.name)
         limits = {name: outcome.numbers[name] for name in ("free", "stuck", "sliding")}
-        writer.put("linear", outcome.linear, Along("frequency"), **limits)
+        writer.put("linear", outcome.linear, CurveAxis("frequency"), **limits)
         writer.put("names", outcome.names)
         if outcome.diameters is not None:
             ring = outcome.numbers[RING]
-            writer.put(DIAMETERS, outcome.diameters, Along("diameters"), **ring)
+            writer.put(DIAMETERS, outcome.diameters, CurveAxis("diameters"), **ring)
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
@@ -79,7 +79,7 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
             _put_bifurcations(writer, BACKBONE, outcome.backbone.bifurcations, case.amount)
         for number, branch in enumerate(outcome.further):
             place = f"{FURTHER}/{number:05d}"
-            writer.put(place, branch.datasets, Along("frequency"), **branch.numbers)
+            writer.put(place, branch.datasets, CurveAxis("frequency"), **branch.numbers)
             _put_bifurcations(writer, place, branch.bifurcations, case.amount)
         for number, sweep in enumerate(outcome.force_sweeps):
             place = f"{FORCE_SWEEPS}/{number:05d}"
@@ -87,10 +87,12 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
             _put_bifurcations(writer, place, sweep.bifurcations, case.amount)
         for number, mode in enumerate(outcome.modes):
             place = f"{MODES}/{number:05d}"
-            writer.put(place, mode.datasets, Along("modal_amplitude"), **mode.numbers)
+            writer.put(place, mode.datasets, CurveAxis("modal_amplitude"), **mode.numbers)
 
 
-def _put_response(writer: ResultsWriter, place: str, amount: Amount, response: Response) -> None:
+def _put_response(
+    writer: ResultsWriter, place: str, amount: ExcitationSize, response: Response
+) -> None:
     put_response_curves(writer, place, amount, response)
     writer.put(f"{place}/{NODES}", response.nodes)
     if response.resonance is not None:
@@ -100,13 +102,13 @@ def _put_response(writer: ResultsWriter, place: str, amount: Amount, response: R
     if response.answers is not None:
         writer.put(f"{place}/{AT}", response.answers.datasets)
     for of, datasets in response.harmonics.items():
-        along = Along("frequency") if of == CURVE else None
+        along = CurveAxis("frequency") if of == CURVE else None
         writer.put(f"{place}/{HARMONICS}/{of}", datasets, along)
     _put_bifurcations(writer, place, response.bifurcations, amount)
 
 
 def _put_bifurcations(
-    writer: ResultsWriter, place: str, bifurcations: Bifurcations, amount: Amount
+    writer: ResultsWriter, place: str, bifurcations: Bifurcations, amount: ExcitationSize
 ) -> None:
     """Write the bifurcations of the curve at a place, if there are any."""
     if bifurcations:
@@ -116,11 +118,11 @@ def _put_bifurcations(
 
 
 def put_response_curves(
-    writer: ResultsWriter, place: str, amount: Amount, response: Response
+    writer: ResultsWriter, place: str, amount: ExcitationSize, response: Response
 ) -> None:
     """Write the curves of a response and its numbers."""
     numbers = {amount.name: response.force, **response.numbers}
-    writer.put(place, response.curves, Along("frequency"), **numbers)
+    writer.put(place, response.curves, CurveAxis("frequency"), **numbers)
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -224,7 +226,7 @@ def _curve_summary(curve: Curves) -> dict[str, Any]:
     return summary
 
 
-def _response_summary(amount: Amount, response: Response) -> dict[str, Any]:
+def _response_summary(amount: ExcitationSize, response: Response) -> dict[str, Any]:
     summary = {amount.name: response.force, **response.numbers}
     if response.bifurcations:
         summary[BIFURCATIONS] = [dict(found) for found in response.bifurcations]
@@ -308,7 +310,7 @@ def _loop_line(loop: Curves) -> str:
     return f"{text}, error {numbers['error']:.1e}"
 
 
-def _further_line(amount: Amount, branch: Curves) -> str:
+def _further_line(amount: ExcitationSize, branch: Curves) -> str:
     numbers = branch.numbers
     if numbers["closed"]:
         ends = ", closed"
@@ -322,7 +324,7 @@ def _further_line(amount: Amount, branch: Curves) -> str:
     )
 
 
-def _backbone_line(amount: Amount, backbone: Curves) -> str:
+def _backbone_line(amount: ExcitationSize, backbone: Curves) -> str:
     (first, last), (low, high) = (
         backbone.datasets[name].values[[0, -1]] for name in ("frequency", amount.name)
     )

@@ -16,7 +16,7 @@ from fe_models.dynamics.stability.floquet import Floquet, Stability
 from sa_solver.steps import Steps
 from sa_solver.types import Array
 from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.excitation import Amount
+from workflow.analyses.vibration.excitation import ExcitationSize
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
@@ -143,7 +143,9 @@ def _columns(known: Sequence[Stability]) -> dict[str, Dataset]:
     }
 
 
-def _described(bifurcation: Bifurcation, amplitude: float, amount: Amount) -> dict[str, Any]:
+def _described(
+    bifurcation: Bifurcation, amplitude: float, amount: ExcitationSize
+) -> dict[str, Any]:
     """Return a bifurcation with the amplitude of its motion [mm], for summary and tables."""
     motion, multiplier = bifurcation.motion, bifurcation.multiplier
     return {
@@ -158,7 +160,7 @@ def _described(bifurcation: Bifurcation, amplitude: float, amount: Amount) -> di
     }
 
 
-def columns_for(amount: Amount) -> dict[str, tuple[str, str]]:
+def columns_for(amount: ExcitationSize) -> dict[str, tuple[str, str]]:
     """Return the columns of a bifurcation other than its kind: name, unit and description."""
     return {
         "frequency": ("Hz", "of the force"),
@@ -172,7 +174,7 @@ def columns_for(amount: Amount) -> dict[str, tuple[str, str]]:
 
 
 def bifurcation_datasets(
-    bifurcations: Sequence[Mapping[str, Any]], amount: Amount
+    bifurcations: Sequence[Mapping[str, Any]], amount: ExcitationSize
 ) -> dict[str, Dataset]:
     """Return columns ``(n,)`` of bifurcations, without their kinds."""
     return {

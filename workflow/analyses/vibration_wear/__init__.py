@@ -23,10 +23,10 @@ def _run(run: Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]) ->
 def _pictures() -> Pictures:
     # Imported here, as plotting takes a second to load.
     from workflow.analyses.vibration_wear.figures import figures_of
-    from workflow.analyses.vibration_wear.outcome import Contents
+    from workflow.analyses.vibration_wear.outcome import VibrationWearContents
     from workflow.analyses.vibration_wear.paraview import write_vibration_wear
 
-    return Pictures(figures_of, write_vibration_wear, contents=Contents)
+    return Pictures(figures_of, write_vibration_wear, contents=VibrationWearContents)
 
 
 ANALYSIS = Analysis(

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.vibration.excitation import FORCE, LEVEL, Amount
+from workflow.analyses.vibration.excitation import FORCE, LEVEL, ExcitationSize
 from workflow.analyses.vibration.figures.stability import draw_motions, explain_stability
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.analyses.vibration_wear.outcome import (
@@ -24,7 +24,7 @@ from workflow.analyses.vibration_wear.outcome import (
     PLACES,
     RESPONSES,
     WORN,
-    Contents,
+    VibrationWearContents,
 )
 from workflow.pictures.panels import (
     Figures,
@@ -75,7 +75,7 @@ ON_GRID = DEPTH, ("area", 1.0, "area in contact [mm²]")
 AT_NODES = DEPTH, ("touching", 1.0, "nodes in contact")
 
 
-def figures_of(contents: Contents) -> Figures:
+def figures_of(contents: VibrationWearContents) -> Figures:
     """Return the figures of a run, by name."""
     return {
         "frequency_response": frequency_response,
@@ -126,12 +126,12 @@ def _peak(response: h5py.Group) -> tuple[float, float]:
     return (at, float(response.attrs["amplitude"])) if inside else (np.nan, np.nan)
 
 
-def _amount(file: h5py.File) -> Amount:
+def _amount(file: h5py.File) -> ExcitationSize:
     """Return the kind of factor of the responses: forces, or levels of an excitation."""
     return LEVEL if file.attrs.get("amount") == LEVEL.name else FORCE
 
 
-def evolution(file: h5py.File, contents: Contents) -> Figure:
+def evolution(file: h5py.File, contents: VibrationWearContents) -> Figure:
     """Draw stiffness, resonances, motion and scar against cycles, from the unworn contact on."""
     history, forces = file[EVOLUTION], list(file.attrs["forces"])
     cycles = history["cycles"][()]
@@ -210,7 +210,7 @@ def _sections(x: Array, y: Array) -> list[tuple[Array, Indices, str]]:
     return [(x[middle], middle, "x [mm]"), (across, diagonal, "along the diagonal [mm]")]
 
 
-def loops(file: h5py.File, contents: Contents) -> Figure:
+def loops(file: h5py.File, contents: VibrationWearContents) -> Figure:
     """Draw loops under the force that wears; for a half-space, the full tangential problem too."""
     figure = new_figure(_change(file, *LOOP_ENERGY), 7.0)
     axis = figure.subplots()

@@ -33,7 +33,7 @@ from workflow.analyses.vibration_wear.outcome import (
     LOOP,
     SLIDERS,
     VibrationWearOutcome,
-    WornState,
+    WornRig,
     depth_fields,
     path_field,
     step_error,
@@ -85,7 +85,7 @@ class _Description:
     reporter: Reporter
     steps: Steps
 
-    def __call__(self, state: WearState, cycles: float, steps: int) -> WornState:
+    def __call__(self, state: WearState, cycles: float, steps: int) -> WornRig:
         """Return the contact after a number of ``cycles``, and the rig on it.
 
         ``steps`` is the number of wear steps since the last state.
@@ -106,7 +106,7 @@ class _Description:
             f"{cycles:g} cycles: {counted(steps, 'step')}, "
             f"stiffness {numbers['stiffness']:.5g} N/mm, stroke {numbers['stroke']:.4g} mm"
         )
-        return WornState(cycles, numbers | linear, _fields(cycle, loop), responses)
+        return WornRig(cycles, numbers | linear, _fields(cycle, loop), responses)
 
     def _responses(self, cycle: ContactCycle) -> tuple[float, tuple[Response, ...], dict[str, Any]]:
         """Return the error of the cycle's motion, the responses to all forces, and frequencies.

@@ -37,7 +37,7 @@ class PadContacts(Joint):
 
 
 @dataclass(frozen=True)
-class NodeTable:
+class ContactTable:
     """Contents of a file about contacts by their ``points``, in its order.
 
     ``area`` ``(n,)`` [mm²] and ``gap`` ``(n,)`` [mm] are None if the file has no such column.
@@ -65,7 +65,7 @@ class NodeTable:
         return [rows[point] for point in points]
 
 
-def read_nodes(file: str) -> NodeTable:
+def read_nodes(file: str) -> ContactTable:
     """Return the contents of a CSV file about contacts at nodes. Raises InputFileError."""
     table = read_table_file(file)
     table.require(("point",), "a column point, and area or gap")
@@ -79,7 +79,7 @@ def read_nodes(file: str) -> NodeTable:
         table.column(name, quantity) if name in table.names else None
         for name, quantity in quantities.items()
     )
-    return NodeTable(table, tuple(points), area, gap)
+    return ContactTable(table, tuple(points), area, gap)
 
 
 class NodeContacts(PadContacts):

@@ -36,7 +36,7 @@ from workflow.analyses.vibration_wear.outcome import (
     POSITION,
     VibrationWearOutcome,
     WornNodes,
-    WornState,
+    WornRig,
     depth_fields,
     path_field,
     step_error,
@@ -62,7 +62,7 @@ def wear_nodes(
     with reporter.stage("wear"):
         pads.at(state)
 
-    def describe(state: NodalState, cycles: float, taken: int) -> WornState:
+    def describe(state: NodalState, cycles: float, taken: int) -> WornRig:
         reached = cycles, taken
         worn = _worn_state(case.unworn, pads.at(state), state, reached, reporter, steps)
         if worn.numbers["step_error"] > wear.tolerance:
@@ -132,7 +132,7 @@ def _worn_state(
     reached: tuple[float, int],
     reporter: Reporter,
     steps: Steps,
-) -> WornState:
+) -> WornRig:
     """Return the pads in a state.
 
     ``reached`` is the number of cycles in all, and of wear steps since the last state.
@@ -166,7 +166,7 @@ def _worn_state(
         f"{cycles:g} cycles: {counted(taken, 'step')}, "
         f"{counted(numbers['touching'], 'node')} touching, stroke {numbers['stroke']:.4g} mm"
     )
-    return WornState(cycles, numbers, _fields(cycle, state, loop), responses)
+    return WornRig(cycles, numbers, _fields(cycle, state, loop), responses)
 
 
 def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, dict[str, Dataset]]:

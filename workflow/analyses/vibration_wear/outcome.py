@@ -28,7 +28,7 @@ NOTHING_WORN = {"depth": 0.0}
 
 
 @dataclass(frozen=True)
-class Contents:
+class VibrationWearContents:
     """Contents of ``results.h5`` of a vibration case with wear.
 
     The contact is ``at_nodes``, or on a grid with loops of its tangential problem. Nodes are
@@ -41,7 +41,7 @@ class Contents:
 
 
 @dataclass(frozen=True)
-class WornState:
+class WornRig:
     """The contact after a number of ``cycles``, and the responses of the rig on it.
 
     ``fields`` are by group, ``numbers`` for the summary.
@@ -72,7 +72,7 @@ class VibrationWearOutcome:
     """
 
     case: VibrationWearCaseBase
-    states: tuple[WornState, ...]
+    states: tuple[WornRig, ...]
     grid: Grid | None = None
     nodes: WornNodes | None = None
 

@@ -25,7 +25,7 @@ from wear.joints.periodic.march import PeriodicMarch
 from wear.laws import WearLaw
 from wear.steps.stepping import ContactFailure
 from wear.surfaces import Surfaces
-from workflow.analyses.vibration.excitation import FORCE, Amount
+from workflow.analyses.vibration.excitation import FORCE, ExcitationSize
 from workflow.analyses.vibration.model import VibrationModel
 
 # Relative change of a resonance's frequency from one state to the next. Farther away, Newton's
@@ -126,7 +126,7 @@ class WearingPads:
     laws: tuple[WearLaw, WearLaw]
     force: float
     frequency: float | None
-    amount: Amount = FORCE
+    amount: ExcitationSize = FORCE
     search: Callable[[HarmonicBalance], HarmonicSolution] | None = None
     _solved: deque[tuple[Surfaces, PadCycle]] = field(
         init=False, default_factory=lambda: deque(maxlen=KEPT)

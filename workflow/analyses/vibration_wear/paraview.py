@@ -24,9 +24,9 @@ from workflow.analyses.vibration_wear.outcome import (
     PLACES,
     POSITION,
     WORN,
-    Contents,
+    VibrationWearContents,
 )
-from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
+from workflow.pictures.view import FIRST, PictureScene, Shown, View, write_view
 from workflow.pictures.vtk import (
     CYCLES,
     FacePoints,
@@ -49,7 +49,9 @@ INTO_BODY = {1: -1.0, 2: 1.0}
 PER_AREA = "N/mm"
 
 
-def write_vibration_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
+def write_vibration_wear(
+    contents: VibrationWearContents, file: h5py.File, folder: Path
+) -> list[Path]:
     """Write the states, their series over the cycles, and the script; return their paths.
 
     Writes nothing where the places of the nodes are not known.
@@ -136,4 +138,4 @@ def _write_view(file: h5py.File, folder: Path) -> Path:
         View("Energy of such a cycle per area", [Shown(SERIES, f"cycle_energy [{PER_AREA}]")]),
     ]
     cycles = float(states[-1].attrs["cycles"])
-    return write_view(Scene(str(file.attrs["title"]), CYCLES, cycles, views), folder / FIRST)
+    return write_view(PictureScene(str(file.attrs["title"]), CYCLES, cycles, views), folder / FIRST)

@@ -12,7 +12,7 @@ from workflow.analyses.vibration.quantities import of_response
 from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
 from workflow.case.plain import times
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.summary import number_at, told
 
 WORN = "depth or volume, by the wear steps, and by harmonics and samples of the motion that wears"
@@ -56,18 +56,18 @@ CURVES = (
 )
 
 
-def main_results(case: VibrationWearCaseBase, summary: Summary) -> list[Quantity]:
+def main_results(case: VibrationWearCaseBase, summary: Summary) -> list[SummaryQuantity]:
     """Return results of every state, the unworn one first."""
     states = enumerate(summary["states"])
     return told(summary, chain.from_iterable(_of_state(n, state, summary) for n, state in states))
 
 
-def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[Quantity]:
+def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[SummaryQuantity]:
     ends = number == len(summary["states"]) - 1
     begun = f"after {times(state['cycles'])} cycles" if state["cycles"] else "unworn"
     group = "at the end" if ends else begun
     place = f"states.{number}"
-    of = partial(Quantity, group)
+    of = partial(SummaryQuantity, group)
     for name, (unit, text, everyday) in NUMBERS.items():
         known = _error(name, place, summary)
         yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from workflow.analyses.vibration.excitation import Amount
+from workflow.analyses.vibration.excitation import ExcitationSize
 from workflow.analyses.vibration.outcome import trend
 from workflow.analyses.vibration.results import put_response_curves
 from workflow.analyses.vibration_wear.case import (
@@ -21,15 +21,15 @@ from workflow.analyses.vibration_wear.outcome import (
     POSITION,
     RESPONSES,
     WORN,
-    Contents,
+    VibrationWearContents,
     VibrationWearOutcome,
     WornNodes,
-    WornState,
+    WornRig,
 )
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
-from workflow.shell.results import Along, On, run_results
+from workflow.shell.results import CurveAxis, On, run_results
 from workflow.shell.summary import finish
 from workflow.shell.tables import DIGITS, heading, write_curves, write_table
 
@@ -58,12 +58,14 @@ def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWea
 # --- results ------------------------------------------------------------------------------------
 
 
-def _contents(outcome: VibrationWearOutcome) -> Contents:
+def _contents(outcome: VibrationWearOutcome) -> VibrationWearContents:
     if outcome.nodes is None:
-        return Contents(at_nodes=False)
+        return VibrationWearContents(at_nodes=False)
     known = outcome.nodes.datasets
     on_plane = "x" in known
-    return Contents(at_nodes=True, placed=on_plane or POSITION in known, on_plane=on_plane)
+    return VibrationWearContents(
+        at_nodes=True, placed=on_plane or POSITION in known, on_plane=on_plane
+    )
 
 
 def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
@@ -79,7 +81,7 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
             writer.put_grid("grid", outcome.grid)
         if outcome.nodes is not None:
             writer.put(PLACES, {**outcome.nodes.datasets, **_named(outcome.nodes)})
-        writer.put(EVOLUTION, outcome.evolution, Along("cycles"))
+        writer.put(EVOLUTION, outcome.evolution, CurveAxis("cycles"))
         for number, state in enumerate(outcome.states):
             place = f"{WORN}/{number:05d}"
             writer.put(place, {}, **state.numbers)
@@ -114,7 +116,7 @@ def _write_tables(outcome: VibrationWearOutcome, folder: OutputFolder) -> None:
             _write_nodes(outcome.nodes, number, state, folder)
 
 
-def _write_nodes(nodes: WornNodes, number: int, state: WornState, folder: OutputFolder) -> None:
+def _write_nodes(nodes: WornNodes, number: int, state: WornRig, folder: OutputFolder) -> None:
     """Write depths and energies of the nodes in a state, a row for each node."""
     what = f"nodes after {state.cycles:g} cycles: gaps, depths, energies of a cycle"
     path = folder.reserve(f"{NODES}_{number:05d}.csv", what)
@@ -145,14 +147,14 @@ def _summary(outcome: VibrationWearOutcome) -> dict[str, Any]:
     }
 
 
-def _of_state(amount: Amount, state: WornState) -> dict[str, Any]:
+def _of_state(amount: ExcitationSize, state: WornRig) -> dict[str, Any]:
     responses = [{amount.name: response.force, **response.numbers} for response in state.responses]
     # JSON has no NaN.
     numbers = {name: value for name, value in state.numbers.items() if value == value}
     return {**numbers, RESPONSES: responses}
 
 
-def _line(amount: Amount, state: WornState) -> str:
+def _line(amount: ExcitationSize, state: WornRig) -> str:
     """Return a state as one line of text."""
     numbers = state.numbers
     resonances = ", ".join(

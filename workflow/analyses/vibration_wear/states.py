@@ -15,7 +15,7 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Response
 from workflow.analyses.vibration.response import response_under, warn_of_error
-from workflow.analyses.vibration_wear.outcome import WornState
+from workflow.analyses.vibration_wear.outcome import WornRig
 from workflow.shell.reporter import Reporter
 
 # Share of the wear in the work for a state; the rest are the responses in it.
@@ -27,10 +27,10 @@ def worn_states(
     stepper: Stepper[State, Contact],
     state: State,
     contact_at: Callable[[State], Contact],
-    describe: Callable[[State, float, int], WornState],
+    describe: Callable[[State, float, int], WornRig],
     reporter: Reporter,
     steps: Steps,
-) -> tuple[WornState, ...]:
+) -> tuple[WornRig, ...]:
     """Return the unworn state, and the states after each number of cycles.
 
     ``describe`` returns the description of a state, from the state, its cycles, and the number of

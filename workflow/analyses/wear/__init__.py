@@ -37,10 +37,10 @@ def _draw_faces(case: WearCase, name: str, out: Path, force: bool) -> Path:
 def _pictures() -> Pictures:
     # Plots take a second to import, so they are imported only where they are drawn.
     from workflow.analyses.wear.figures.wear import figures_of
-    from workflow.analyses.wear.layout import Contents
+    from workflow.analyses.wear.layout import WearContents
     from workflow.analyses.wear.paraview.wear import write_wear
 
-    return Pictures(figures_of, write_wear, contents=Contents)
+    return Pictures(figures_of, write_wear, contents=WearContents)
 
 
 ANALYSIS = Analysis(

@@ -14,7 +14,7 @@ from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
-from workflow.shell.results import Along, ResultsWriter
+from workflow.shell.results import CurveAxis, ResultsWriter
 from workflow.shell.store import read_arrays
 
 # Group of the results, and dataset in the file of a jump.
@@ -66,7 +66,7 @@ class BoltTensions:
                 "N",
                 "tension at peak load after each jump, as the loads were last solved",
             )
-            writer.put(f"{BOLTS}/{name}", {"tension": left}, Along("kinetics/cycles"))
+            writer.put(f"{BOLTS}/{name}", {"tension": left}, CurveAxis("kinetics/cycles"))
 
     def summary(self) -> dict[str, Any]:
         """Return the tensions of each bolt by name; empty without bolts."""

@@ -11,7 +11,7 @@ import numpy as np
 from sa_solver.normal.contact import NormalStart
 from sa_solver.types import LoadHistory
 from wear.contact.interface import InterfaceState
-from wear.contact.link import Link
+from wear.contact.link import StructureLink
 from wear.coupled import CoupledState
 from wear.steps.full_cycle import CycleStart
 from wear.surfaces import Surfaces
@@ -23,7 +23,7 @@ from workflow.shell.checkpoint import StoredState, save
 # Arrays over all jumps.
 HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
 # Contents of one interface's state: groups of arrays, arrays, numbers.
-PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory, "link": Link}
+PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory, "link": StructureLink}
 ARRAYS = ("slip", "pressed", "paths")
 # Start values of normal contact solves: their increments, and these fields of each.
 INCREMENTS, START = "starts/increments", ("pressure", "displacement")

@@ -15,7 +15,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.wear.case.loops import Loops
-from workflow.analyses.wear.loop_table import COLUMNS, SLIDES, Column, write_loop_table
+from workflow.analyses.wear.loop_table import COLUMNS, SLIDES, LoopColumn, write_loop_table
 from workflow.models.loops import WornLoop
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
@@ -66,7 +66,7 @@ def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int, per_len
         writer.put(f"{LOOPS_OVER_ENERGY}/{name}", over)
 
 
-def _unit(column: Column, per_length: bool) -> str:
+def _unit(column: LoopColumn, per_length: bool) -> str:
     """Return the unit for the results writer, which adds "per mm" to energies, not stiffnesses."""
     energy = column.name == "energy"
     return "N mm" if energy else column.units(per_length)[0]

@@ -29,7 +29,7 @@ def jump_name(number: int) -> str:
 
 
 @dataclass(frozen=True)
-class Contents:
+class WearContents:
     """Optional contents of the results; loads, contact, surfaces and kinetics are always there.
 
     ``names`` are the interfaces and ``bodies`` the names of body 1 and body 2. ``jumps`` is their

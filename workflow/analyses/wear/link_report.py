@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from wear.contact.link import Link
+from wear.contact.link import StructureLink
 from workflow.shell.reporter import Reporter
 
 
-def link_summary(link: Link) -> dict[str, Any]:
+def link_summary(link: StructureLink) -> dict[str, Any]:
     """Return the summary of the link to the unworn structure, with details if it is corrected.
 
     Displacements are relative to the deflection of the half-spaces at the largest load.
@@ -26,7 +26,7 @@ def link_summary(link: Link) -> dict[str, Any]:
     }
 
 
-def report_link(name: str, link: Link, line: bool, reporter: Reporter) -> None:
+def report_link(name: str, link: StructureLink, line: bool, reporter: Reporter) -> None:
     """Log how a contact is linked, and warn if the fit error exceeds the graininess."""
     if not link.corrects:
         reporter.log(f"{name}: the bodies are taken for half-spaces")

@@ -18,7 +18,7 @@ from workflow.shell.tables import heading, write_table
 
 
 @dataclass(frozen=True)
-class Column:
+class LoopColumn:
     """Column of the table: ``unit`` is the base unit, ``shown`` the unit in the file.
 
     ``extensive`` quantities are per mm in a line contact.
@@ -45,21 +45,25 @@ class Column:
 
 
 COLUMNS = (
-    Column("cycles", "1", "1", "cycles", extensive=False),
-    Column("energy", "N*mm", "J", "energy that wear has dissipated so far"),
-    Column("P", "N", "N", "normal force"),
-    Column("kt", "N/mm", "N/mm", "tangential stiffness of the stuck contact"),
-    Column("mu", "1", "1", "largest tangential over normal force", extensive=False),
-    Column("energy_per_loop", "N*mm", "mJ", "energy dissipated in the loop"),
-    Column("area", "mm^2", "mm^2", "area in contact"),
-    Column("amplitude", "mm", "mm", "half the range of the displacement", extensive=False),
-    Column("force", "N", "N", "half the range of the tangential force"),
-    Column("sliding", "1", "1", "share of P on cells that slip as branches end", extensive=False),
-    Column("residual_stiffness", "N/mm", "N/mm", "slope of the loop as branches end"),
-    Column("border_load", "1", "1", "share of P on the grid's outermost cells", extensive=False),
-    Column("kt_error", "N/mm", "N/mm", "estimated error of kt by grid"),
-    Column("mu_error", "1", "1", "of mu by grid and increments", extensive=False),
-    Column("energy_per_loop_error", "N*mm", "mJ", "of energy_per_loop by grid and increments"),
+    LoopColumn("cycles", "1", "1", "cycles", extensive=False),
+    LoopColumn("energy", "N*mm", "J", "energy that wear has dissipated so far"),
+    LoopColumn("P", "N", "N", "normal force"),
+    LoopColumn("kt", "N/mm", "N/mm", "tangential stiffness of the stuck contact"),
+    LoopColumn("mu", "1", "1", "largest tangential over normal force", extensive=False),
+    LoopColumn("energy_per_loop", "N*mm", "mJ", "energy dissipated in the loop"),
+    LoopColumn("area", "mm^2", "mm^2", "area in contact"),
+    LoopColumn("amplitude", "mm", "mm", "half the range of the displacement", extensive=False),
+    LoopColumn("force", "N", "N", "half the range of the tangential force"),
+    LoopColumn(
+        "sliding", "1", "1", "share of P on cells that slip as branches end", extensive=False
+    ),
+    LoopColumn("residual_stiffness", "N/mm", "N/mm", "slope of the loop as branches end"),
+    LoopColumn(
+        "border_load", "1", "1", "share of P on the grid's outermost cells", extensive=False
+    ),
+    LoopColumn("kt_error", "N/mm", "N/mm", "estimated error of kt by grid"),
+    LoopColumn("mu_error", "1", "1", "of mu by grid and increments", extensive=False),
+    LoopColumn("energy_per_loop_error", "N*mm", "mJ", "of energy_per_loop by grid and increments"),
 )
 # Share of P that must slip for mu to be the coefficient of friction, not just what is mobilised.
 SLIDES = 1.0 - 1e-6

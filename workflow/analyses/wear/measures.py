@@ -11,7 +11,7 @@ import numpy as np
 
 from sa_solver.types import Array, Grid
 from workflow.analyses.wear.case.base import WearCase
-from workflow.shell.analysis import Comparison, Summary
+from workflow.shell.analysis import ChartComparison, Summary
 
 WORN = ("depth_1", "depth_2", "volume_1", "volume_2")
 MIDDLE = "middle"
@@ -147,7 +147,7 @@ def _apart(folder: Path, reference: Path, summary: Summary) -> dict[str, float]:
     return {} if difference is None else {PROFILE: difference}
 
 
-COMPARISON: Comparison[WearCase] = Comparison(
+COMPARISON: ChartComparison[WearCase] = ChartComparison(
     quantities=quantities,
     extras=extra_quantities,
     sections=middle_quantities,

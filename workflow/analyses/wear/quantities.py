@@ -11,7 +11,7 @@ from workflow.analyses.wear.layout import MOMENTS, RESULTS
 from workflow.analyses.wear.measures import interfaces
 from workflow.shell.analysis import Summary
 from workflow.shell.dataset import unit_in
-from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.summary import estimate, number_at, told
 
 # Source of estimated errors in the report: totals of the error budget.
@@ -56,7 +56,7 @@ CURVES = (
 )
 
 
-def main_results(case: WearCase, summary: Summary) -> list[Quantity]:
+def main_results(case: WearCase, summary: Summary) -> list[SummaryQuantity]:
     """Return the results of every interface, bolt and body of the structure."""
     quantities = [
         quantity
@@ -71,10 +71,10 @@ def named(body: str) -> str:
     return body.replace("_", " ")
 
 
-def _worn(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]:
+def _worn(case: WearCase, summary: Summary, name: str) -> Iterator[SummaryQuantity]:
     """Yield wear, pressures and loads of an interface."""
     line = summary["per_length"]
-    of = partial(Quantity, name)
+    of = partial(SummaryQuantity, name)
     results = "depth", "volume", "peak_pressure", "worn_peak_pressure"
     error = {key: _budgeted(summary, name, key) for key in results}
     for number, body in enumerate(case.bodies, 1):
@@ -114,7 +114,7 @@ def _is_there(summary: Summary, path: str, beside: str) -> bool:
     return force is not None and abs(force) > ROUNDING * abs(other or 0.0)
 
 
-def _load_ranges(summary: Summary, name: str) -> Iterator[Quantity]:
+def _load_ranges(summary: Summary, name: str) -> Iterator[SummaryQuantity]:
     """Yield the ranges of tangential forces in a cycle, with their increments."""
     unit = unit_in(summary["per_length"], "N")
     for moment in MOMENTS:
@@ -123,7 +123,7 @@ def _load_ranges(summary: Summary, name: str) -> Iterator[Quantity]:
             if not _acts(ranges, load):
                 continue
             for end in ("least", "largest"):
-                yield Quantity(
+                yield SummaryQuantity(
                     name,
                     f"{end} tangential force {load} in a cycle, {moment}",
                     f"{name}.load_range.{moment}.{load}.{end}",
@@ -140,9 +140,9 @@ def _acts(ranges: Summary, load: str) -> bool:
     return bool(reached > LITTLE * ranges["P"]["largest"])
 
 
-def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]:
+def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[SummaryQuantity]:
     """Yield tangential loops, stress and fretting parameters under an interface."""
-    of, per = partial(Quantity, name), "/mm" if summary["per_length"] else ""
+    of, per = partial(SummaryQuantity, name), "/mm" if summary["per_length"] else ""
     for moment in MOMENTS:
         path = f"{name}.loops.{moment}"
         text, unit = f"tangential stiffness of the loop, {moment}", f"N/mm{per}"
@@ -176,11 +176,11 @@ def _budgeted(summary: Summary, name: str, result: str) -> dict[str, Any]:
     return known | {"budget": (RESULTS[result], path)} if known else {}
 
 
-def _of_bolts(summary: Summary) -> Iterator[Quantity]:
+def _of_bolts(summary: Summary) -> Iterator[SummaryQuantity]:
     """Yield the tension of every bolt at peak load, and the share lost by wear."""
     unit = unit_in(summary["per_length"], "N")
     for bolt in summary.get(STRUCTURE, {}).get("bolts", {}):
-        of, path = partial(Quantity, named(bolt)), f"{STRUCTURE}.bolts.{bolt}"
+        of, path = partial(SummaryQuantity, named(bolt)), f"{STRUCTURE}.bolts.{bolt}"
         yield of("shortening", f"{path}.shortening", "mm")
         for moment in MOMENTS:
             text = f"tension at peak load, {moment}"
@@ -188,11 +188,11 @@ def _of_bolts(summary: Summary) -> Iterator[Quantity]:
         yield of("share of the tension that is lost", f"{path}.lost", "1")
 
 
-def _of_structure(summary: Summary) -> Iterator[Quantity]:
+def _of_structure(summary: Summary) -> Iterator[SummaryQuantity]:
     """Yield the largest stress of every body off the contact faces, and its elements."""
     # Bodies have the names of the mesh file.
     for body in summary.get(STRUCTURE, {}).get("mesh", {}):
-        of, mesh = partial(Quantity, named(body)), f"{STRUCTURE}.mesh.{body}"
+        of, mesh = partial(SummaryQuantity, named(body)), f"{STRUCTURE}.mesh.{body}"
         for moment in MOMENTS:
             path = f"{STRUCTURE}.peak_stress.{moment}.{body}.notch"
             text = f"largest von Mises stress on the free surface, {moment}"

@@ -72,7 +72,7 @@ class RunLog(Observer):
 
 
 @dataclass
-class Recorder(Observer):
+class FileRecorder(Observer):
     """Writer of the fields of every jump and, from time to time, of the state for a restart.
 
     Fields are those at ``peak`` load. ``jumps`` are the digests of the jump files, starting with

@@ -31,7 +31,7 @@ from workflow.analyses.wear.datasets import (
     put_face,
     surface_heights,
 )
-from workflow.analyses.wear.layout import EXTRAPOLATION, MOMENTS, Contents, energy_name
+from workflow.analyses.wear.layout import EXTRAPOLATION, MOMENTS, WearContents, energy_name
 from workflow.analyses.wear.link_report import link_summary
 from workflow.analyses.wear.outcome import STOPPED, InterfaceOutcome, Outcome
 from workflow.analyses.wear.run_errors import warn_of_errors
@@ -48,7 +48,7 @@ from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
-from workflow.shell.results import Along, On, ResultsWriter, run_results
+from workflow.shell.results import CurveAxis, On, ResultsWriter, run_results
 from workflow.shell.store import read_arrays
 from workflow.shell.summary import finish
 
@@ -152,7 +152,7 @@ def _write_results(
     stresses: list[InterfaceStress],
     budget: Budget,
     run: Run[WearCase],
-) -> tuple[dict[str, PeakHistory], Contents]:
+) -> tuple[dict[str, PeakHistory], WearContents]:
     """Write ``results.h5``; return the recorded peak histories by interface, and its contents."""
     case, source = outcome.case, outcome.source
     attributes = {
@@ -188,7 +188,7 @@ def _write_results(
             stress.write(writer)
         for name, errors in budget.items():
             writer.put(f"error/{name}", datasets_of(errors), accuracy=case.accuracy)
-        contents = Contents(
+        contents = WearContents(
             names=tuple(sorted(contact.stage.name for contact in outcome.interfaces)),
             bodies=case.bodies,
             jumps=outcome.state.jump,
@@ -285,7 +285,7 @@ def _write_kinetics(
             for quantity, regime in contact.regimes.items()
             for attribute, field in REGIME_ATTRIBUTES.items()
         }
-        writer.put(f"kinetics/{name}", columns, Along("kinetics/cycles"), **regimes)
+        writer.put(f"kinetics/{name}", columns, CurveAxis("kinetics/cycles"), **regimes)
 
 
 def _summary(

@@ -24,7 +24,7 @@ from workflow.analyses.wear.contact_workers import (
 )
 from workflow.analyses.wear.model import wear_model
 from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
-from workflow.analyses.wear.recording import Recorder, RunLog, reported_stage
+from workflow.analyses.wear.recording import FileRecorder, RunLog, reported_stage
 from workflow.analyses.wear.results import write_output
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
@@ -169,7 +169,7 @@ def _march(
     """Return the final state, from ``kept`` or from unworn surfaces, and the first contacts."""
     case, reporter, settings = run.case, run.reporter, model.settings(source)
     jumps = list(run.kept.jumps) if run.kept else []
-    recorder = Recorder(run, settings, source.peak, contacts, jumps, source)
+    recorder = FileRecorder(run, settings, source.peak, contacts, jumps, source)
     loop = model.loop(source, contacts, (RunLog(run, contacts, source), recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source, contacts.stages, state, first, reporter)

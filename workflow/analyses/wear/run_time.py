@@ -75,7 +75,7 @@ class Extent:
 
 
 @dataclass(frozen=True)
-class Steps:
+class ExpectedSteps:
     """Wear steps of a run, its ``jumps``, and the reason if their number is ``unknown``.
 
     Unknown numbers are replaced by those of a typical case.
@@ -119,7 +119,7 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
     return RunTime(before, shared * worn + again * cycle, after, assumed, taken.unknown)
 
 
-def steps_of(case: WearCase, extent: Extent) -> Steps:
+def steps_of(case: WearCase, extent: Extent) -> ExpectedSteps:
     """Return the wear steps of a case, counted where its settings determine their number.
 
     The number is unknown where a step wears a given depth or volume, unless the run stops at a
@@ -129,20 +129,22 @@ def steps_of(case: WearCase, extent: Extent) -> Steps:
     wear, step = case.wear, case.wear.step
     if step.cycles is not None:
         jumps = ceil(wear.cycles / step.cycles)
-        return Steps(jumps, jumps)
+        return ExpectedSteps(jumps, jumps)
     if step.fraction is not None:
         steps = max(RECORDED, wear.cycles / (step.fraction * _stable(case, extent)))
-        return Steps(steps, RECORDED)
+        return ExpectedSteps(steps, RECORDED)
     for size in ("depth", "volume"):
         if (worn := getattr(step, size)) is not None:
             end = getattr(wear.stop, size)
             if end is not None:
-                return Steps(ceil(end / worn), ceil(end / worn))
-            return Steps(BY_SIZE, BY_SIZE, UNKNOWN.format(f"the {size} worn"))
+                return ExpectedSteps(ceil(end / worn), ceil(end / worn))
+            return ExpectedSteps(BY_SIZE, BY_SIZE, UNKNOWN.format(f"the {size} worn"))
     finer = 1.0 if wear.depth_tolerance is not None else max(1.0, sqrt(0.01 / wear.tolerance))
     if case.contact.method == "full":
-        return Steps(finer * AUTOMATIC_FULL, 0.5 * finer * AUTOMATIC_FULL, UNKNOWN.format(STICKING))
-    return Steps(finer * AUTOMATIC, 0.5 * finer * AUTOMATIC)
+        return ExpectedSteps(
+            finer * AUTOMATIC_FULL, 0.5 * finer * AUTOMATIC_FULL, UNKNOWN.format(STICKING)
+        )
+    return ExpectedSteps(finer * AUTOMATIC, 0.5 * finer * AUTOMATIC)
 
 
 def _stable(case: WearCase, extent: Extent) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from workflow.analyses.vibration.excitation import told_in
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.style import BLACK
 
@@ -18,7 +18,7 @@ MULTIPLES = 2, 3
 STYLES = {"free": ":", "stuck": "--"}
 
 
-def engine_orders(file: h5py.File, contents: Contents) -> Figure:
+def engine_orders(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw the line of the excitation's order, those of its harmonics, and the resonances on it."""
     order = float(file.attrs["engine_order"])
     responses = [file["responses"][name] for name in contents.responses]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from workflow.analyses.vibration.excitation import told_in, under_in
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 
@@ -24,7 +24,7 @@ REACH = 1.6
 HEADROOM = 1.08
 
 
-def loops(file: h5py.File, contents: Contents) -> Figure:
+def loops(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw force against displacement in a cycle, and the rising branches from one reversal.
 
     For resolutions coarser than the last, the force in the harmonics alone is shown, thin and

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.vibration.outcome import MODES, Contents
+from workflow.analyses.vibration.outcome import MODES, VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, plain_ticks, spread
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE
@@ -26,7 +26,7 @@ ROW_HEIGHT = 3.6
 ROOM = 0.1
 
 
-def modes(file: h5py.File, contents: Contents) -> Figure:
+def modes(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw a row for each mode, over the observed amplitude, together with phase resonance."""
     shown = spread(contents.modes, MOST_MODES)
     figure = new_figure(_title(file, contents), 1.2 + ROW_HEIGHT * len(shown))
@@ -52,7 +52,7 @@ def modes(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def _title(file: h5py.File, contents: Contents) -> str:
+def _title(file: h5py.File, contents: VibrationContents) -> str:
     """Return a title on the first mode."""
     first = file[MODES][contents.modes[0]].attrs
     begin, end = first["frequency"]

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from workflow.analyses.vibration.excitation import Amount, amount_in, told_in, under_in
+from workflow.analyses.vibration.excitation import ExcitationSize, amount_in, told_in, under_in
 from workflow.analyses.vibration.figures.engine import engine_orders
 from workflow.analyses.vibration.figures.loops import loops
 from workflow.analyses.vibration.figures.modes import modes
@@ -23,7 +23,7 @@ from workflow.analyses.vibration.figures.stability import (
     mark_bifurcations,
 )
 from workflow.analyses.vibration.figures.states import node_states, pad_states
-from workflow.analyses.vibration.outcome import AT, FURTHER, Contents
+from workflow.analyses.vibration.outcome import AT, FURTHER, VibrationContents
 from workflow.pictures.panels import (
     Figures,
     legend_below,
@@ -47,7 +47,7 @@ TURN, QUARTER = 360.0, 90.0
 ABOVE, BELOW = 3.0, 0.5
 
 
-def figures_of(contents: Contents) -> Figures:
+def figures_of(contents: VibrationContents) -> Figures:
     """Return the figures of a run, by name."""
     many = contents.joints > MOST_JOINTS
     drawn = {
@@ -67,7 +67,7 @@ def figures_of(contents: Contents) -> Figures:
     }
 
 
-def _shown(file: h5py.File, contents: Contents) -> list[tuple[h5py.Group, Any]]:
+def _shown(file: h5py.File, contents: VibrationContents) -> list[tuple[h5py.Group, Any]]:
     """Return the responses to show, each with its colour; of many responses, only some."""
     chosen = shaded(contents.responses, MOST_CURVES)
     return [(file["responses"][name], colour) for name, colour in chosen]
@@ -80,7 +80,7 @@ def _seen(file: h5py.File) -> str:
     return f"{file.attrs['seen'][-1]}{against}"
 
 
-def _amount_of(file: h5py.File) -> Amount:
+def _amount_of(file: h5py.File) -> ExcitationSize:
     """Return the kind of factor of the responses: forces, or levels of an excitation."""
     first, *_ = file["responses"].values()
     return amount_in(first.attrs)[0]
@@ -89,7 +89,7 @@ def _amount_of(file: h5py.File) -> Amount:
 # --- frequency response -------------------------------------------------------------------------
 
 
-def frequency_response(file: h5py.File, contents: Contents) -> Figure:
+def frequency_response(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw the observed amplitude over the force, a curve per force, with limits and phase.
 
     The limits are those of the linear structure, with joints free and stuck.
@@ -141,7 +141,7 @@ def _draw_phase(axis: Axes, motions: h5py.Group, **look: Any) -> None:
 
 
 def _draw_further(
-    axis: Axes, file: h5py.File, contents: Contents, phase: Axes | None = None
+    axis: Axes, file: h5py.File, contents: VibrationContents, phase: Axes | None = None
 ) -> list[h5py.Group]:
     """Draw further branches in the colours of their forces, and return these branches.
 
@@ -186,7 +186,7 @@ def _title(file: h5py.File) -> str:
 # --- resonance ----------------------------------------------------------------------------------
 
 
-def resonance(file: h5py.File, contents: Contents) -> Figure:
+def resonance(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw amplitudes with the backbone of phase resonance; frequency and damping against force."""
     figure = new_figure(_resonance_title(file), 8.0)
     places = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
@@ -209,7 +209,7 @@ def resonance(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
+def _draw_amplitudes(axis: Axes, file: h5py.File, contents: VibrationContents) -> None:
     for response, colour in _shown(file, contents):
         size = TO_MICRONS * response["amplitude"][:, -1]
         look = {"color": colour, "label": told_in(response.attrs), "linewidth": 1.4}

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from workflow.analyses.vibration.excitation import told_in
-from workflow.analyses.vibration.outcome import DIAMETERS, Contents
+from workflow.analyses.vibration.outcome import DIAMETERS, VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, whole_ticks
 from workflow.pictures.style import BLACK, BLUE, ORANGE
 
@@ -17,7 +17,7 @@ MOST_MODES = 8
 ABOVE = 1.15
 
 
-def nodal_diameters(file: h5py.File, contents: Contents) -> Figure:
+def nodal_diameters(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw frequencies with joints free and stuck, and engine orders folded at N/2.
 
     The engine orders are those at the speed of the resonance.

@@ -21,7 +21,7 @@ from workflow.analyses.vibration.figures.states import (
     kinds_of,
     largest_at,
 )
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import VibrationContents
 from workflow.pictures.panels import new_figure, plain_ticks, spread, whole_ticks
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, ORANGE
@@ -35,7 +35,7 @@ DOES = {"sticks, or is pressed": BLUE, "slips": ORANGE, "is apart": "#B8B8B8"}
 RESPONSE, STRIP, MAP, AROUND = 2.2, 1.5, 2.6, 1.6
 
 
-def joint_states(file: h5py.File, contents: Contents) -> Figure:
+def joint_states(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw for how much of the period each of a few joints sticks, slips and is apart.
 
     Joints that always stick, such as springs, are left out.
@@ -65,7 +65,7 @@ def joint_states(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def node_shares(file: h5py.File, contents: Contents) -> Figure:
+def node_shares(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw shares of the period in which many joints slip and are apart, and counts by state."""
     shown = _shown(file, contents)
     figure = new_figure(_most_at_once(shown), AROUND + RESPONSE + 2.0 * MAP + STRIP)
@@ -100,7 +100,7 @@ def node_shares(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def _shown(file: h5py.File, contents: Contents) -> list[h5py.Group]:
+def _shown(file: h5py.File, contents: VibrationContents) -> list[h5py.Group]:
     return [file["responses"][name] for name in spread(contents.responses, MOST_FORCES)]
 
 
@@ -176,7 +176,7 @@ def _draw_map(axis: Axes, edges: Array, shares: Array) -> Any:
 # --- words --------------------------------------------------------------------------------------
 
 
-def _order(file: h5py.File, contents: Contents) -> tuple[Indices, Any, str]:
+def _order(file: h5py.File, contents: VibrationContents) -> tuple[Indices, Any, str]:
     """Return the joints from the bottom up, ticks for them, and a label of their order."""
     if not contents.places:
         return np.arange(contents.joints), None, "joints by number"

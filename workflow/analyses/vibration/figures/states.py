@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Indices
 from workflow.analyses.vibration.excitation import amount_in, told_in, under_in
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import VibrationContents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.pictures.panels import new_figure, plain_ticks, spread
 from workflow.pictures.scales import TO_MICRONS
@@ -49,7 +49,7 @@ MOST_TICKS = 6
 AROUND_PADS, PAD_ROWS, WIDE = 2.4, 6.6, 4
 
 
-def node_states(file: h5py.File, contents: Contents) -> Figure:
+def node_states(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw the state of every node over frequency, below the response, under some forces."""
     shown = [file["responses"][name] for name in spread(contents.responses, MOST_MAPS)]
     figure = new_figure(_title(shown), 8.5)
@@ -78,7 +78,7 @@ def node_states(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def pad_states(file: h5py.File, contents: Contents) -> Figure:
+def pad_states(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw the state of the nodes on the pad: below, at and above the peak of each force."""
     shown = [file["responses"][name] for name in spread(contents.responses, MOST_PADS)]
     height = PAD_ROWS * min(1.0, WIDE / len(shown))

@@ -18,7 +18,7 @@ from workflow.analyses.wear.outcome import Outcome
 from workflow.analyses.wear.structures import structure_of
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
-from workflow.shell.processes import Beside
+from workflow.shell.processes import WorkerProcess
 from workflow.shell.reporter import Reporter
 
 Lives = dict[str, Worn]  # by part
@@ -45,7 +45,7 @@ def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str
 
 
 def lives_of_companions(
-    case: WearCase, source: LoadSource, reporter: Reporter, beside: Beside
+    case: WearCase, source: LoadSource, reporter: Reporter, beside: WorkerProcess
 ) -> Begun:
     """Return a function for the errors from probe runs, given when the loads followed wear.
 

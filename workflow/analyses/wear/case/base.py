@@ -16,10 +16,10 @@ from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.case.scanned import WithScans
 from workflow.analyses.wear.case.sections import (
     BodiesThatWear,
-    Contact,
+    ContactSection,
     ContactStress,
     Coupling,
-    Nonlinearity,
+    NonlinearitySection,
     Ratio,
 )
 from workflow.analyses.wear.case.worn_bodies import Worn, wearing
@@ -80,7 +80,9 @@ class WearCase(WithScans, Case):
     structure: Section = entry("what is loaded")
     materials: Section = entry("the two bodies in contact")
     friction: EvolvingFriction = entry("Coulomb's law on every contact face")
-    contact: Contact = entry("half-space grid over each contact face", default=Contact())
+    contact: ContactSection = entry(
+        "half-space grid over each contact face", default=ContactSection()
+    )
     wear: BodiesThatWear = entry("law, length of the run and step")
     loops: Loops = entry(
         "tangential loops on the worn contacts, where amplitude or force is given", default=Loops()
@@ -123,7 +125,7 @@ class WearCase(WithScans, Case):
         """Terms of all :attr:`contact_names`."""
         return [self.terms(name) for name in self.contact_names]
 
-    def contact_of(self, name: str) -> Contact:
+    def contact_of(self, name: str) -> ContactSection:
         """Return the section ``contact`` with the grid of the contact of that name."""
         return self.contact.model_copy(update={"grid": self.terms(name).grid})
 
@@ -223,7 +225,9 @@ class WearCase(WithScans, Case):
 class FiniteElementCase(WearCase):
     """Case whose loads come from a finite element structure."""
 
-    nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
+    nonlinearity: NonlinearitySection = entry(
+        "geometric, of the structure", default=NonlinearitySection()
+    )
     coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
 
     def told_of_nodes(self) -> Iterator[str]:

@@ -18,7 +18,7 @@ from workflow.analyses.wear.case.worn_bodies import (
 from workflow.case.fields import Quantity, Whole
 from workflow.case.plain import plain, shares, times
 from workflow.case.sections import (
-    ElasticBody,
+    ElasticSection,
     FaceCells,
     Length,
     Section,
@@ -76,7 +76,7 @@ class TwoBodies(Section, Generic[Part]):
     body_2: Part = entry("the upper, moving body")
 
 
-class Solid(ElasticBody):
+class Solid(ElasticSection):
     """Isotropic linear elastic material of finite elements."""
 
     young: Stress = entry("Young's modulus [MPa]", "115 GPa")
@@ -86,21 +86,21 @@ class Solid(ElasticBody):
     )
 
 
-class Material(Solid):
+class MaterialSection(Solid):
     """Isotropic linear elastic material with a mass."""
 
     density: Density = entry("mass per volume [t/mm^3]", "4430 kg/m^3")
 
 
-class BladeAndDiskMaterials(BladeAndDisk[Material]):
+class BladeAndDiskMaterials(BladeAndDisk[MaterialSection]):
     """The two bodies in contact."""
 
 
-class TwoMaterials(TwoBodies[Material]):
+class TwoMaterials(TwoBodies[MaterialSection]):
     """The two bodies in contact."""
 
 
-class Contact(Section):
+class ContactSection(Section):
     """Half-space solution on a grid over each contact face."""
 
     grid: FaceCells = entry(
@@ -182,7 +182,7 @@ class Step(Section):
         return all(getattr(self, key) is None for key in SIZES)
 
 
-class Stop(Section):
+class StopSection(Section):
     """Limits that end the run before its cycles are over; the first is reached to within 0.1 %."""
 
     depth: Length | None = entry("largest depth of either body [mm]", "0.5 mm", default=None)
@@ -210,7 +210,7 @@ class Duration(Section):
         "auto",
         default="auto",
     )
-    stop: Stop = entry("ends the run early", default=Stop())
+    stop: StopSection = entry("ends the run early", default=StopSection())
 
     @property
     def step_size(self) -> str:
@@ -287,11 +287,11 @@ class DovetailWear(BladeAndDisk[BodyWear], BodiesThatWear):
     """Wear laws of blade and disk, and length of the run."""
 
 
-class Wear(TwoBodies[BodyWear], BodiesThatWear):
+class WearSection(TwoBodies[BodyWear], BodiesThatWear):
     """Wear laws of two bodies, and length of the run."""
 
 
-class Nonlinearity(Section):
+class NonlinearitySection(Section):
     """Geometric nonlinearity: its effect is small for stiff joints, and the check measures it."""
 
     stiffness: Literal["linear", "stress_stiffened", "relinearised"] = entry(

@@ -56,7 +56,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Axis:
+class FidelityAxis:
     """An approximation: its main ``entry``, its ``share`` of the accuracy and its decision.
 
     ``decide`` takes the case with the decisions of earlier axes, and the error that it may cause.
@@ -251,10 +251,10 @@ def _decision(
 
 
 AXES = (
-    Axis("load_path.increments", 0.18, choose_increments),
-    Axis("mesh.flank_nodes", 0.38, choose_mesh),
-    Axis("contact.grid", 0.12, choose_grid),
-    Axis("contact.tolerance", 0.02, choose_tolerance),
-    Axis("wear.tolerance", 0.18, choose_steps),
-    Axis("coupling.drift", 0.12, choose_drift),
+    FidelityAxis("load_path.increments", 0.18, choose_increments),
+    FidelityAxis("mesh.flank_nodes", 0.38, choose_mesh),
+    FidelityAxis("contact.grid", 0.12, choose_grid),
+    FidelityAxis("contact.tolerance", 0.02, choose_tolerance),
+    FidelityAxis("wear.tolerance", 0.18, choose_steps),
+    FidelityAxis("coupling.drift", 0.12, choose_drift),
 )

@@ -15,7 +15,7 @@ from typing import Any
 
 from workflow.analyses.wear.budget.lives import FAILURES
 from workflow.analyses.wear.choice import Decision, record_of, since
-from workflow.analyses.wear.fidelity.axes import AXES, Axis
+from workflow.analyses.wear.fidelity.axes import AXES, FidelityAxis
 from workflow.analyses.wear.fidelity.dimension import choose_dimension
 from workflow.analyses.wear.fidelity.probe import LEGS
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
@@ -37,7 +37,7 @@ def choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any]]:
     return case, record_of(decisions, case.accuracy, since(begin))
 
 
-def _decide(axis: Axis, case: DovetailCase, allowed: float) -> Decision:
+def _decide(axis: FidelityAxis, case: DovetailCase, allowed: float) -> Decision:
     """Return the decision of an axis, or the case's own setting if its probe fails."""
     begin = time.perf_counter()
     try:

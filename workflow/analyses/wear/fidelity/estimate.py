@@ -36,7 +36,7 @@ class Deviation:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class FidelityEstimate:
     """Deviations of all quantities of all interfaces."""
 
     deviations: tuple[Deviation, ...]
@@ -72,7 +72,7 @@ def scales(values: Numbers) -> Numbers:
     }
 
 
-def estimate(values: Sequence[Numbers], steps: Sequence[float], order: float) -> Estimate:
+def estimate(values: Sequence[Numbers], steps: Sequence[float], order: float) -> FidelityEstimate:
     """Return the errors of the rungs, coarse to fine, of methods of at most this ``order``.
 
     Errors are relative to the last rung. The last error is Richardson's; each other one adds the
@@ -84,7 +84,7 @@ def estimate(values: Sequence[Numbers], steps: Sequence[float], order: float) ->
         for name, scale in quantities.items():
             series = [rung[flank][name] for rung in values]
             deviations.append(_deviation(f"{name} on the {flank}", series, scale, steps, order))
-    return Estimate(tuple(deviations))
+    return FidelityEstimate(tuple(deviations))
 
 
 def _deviation(

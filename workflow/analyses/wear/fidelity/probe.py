@@ -21,7 +21,7 @@ from wear.steps.implicit import ImplicitStepper
 from wear.steps.marching import advance_cycles
 from wear.steps.stepping import SlidingCycle, WearingContact, WearState
 from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortened, worn_by
-from workflow.analyses.wear.case.sections import Contact
+from workflow.analyses.wear.case.sections import ContactSection
 from workflow.analyses.wear.fidelity.estimate import Numbers
 from workflow.analyses.wear.structures.dovetail.case import SIDES, DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
@@ -56,7 +56,7 @@ def plane_section(case: DovetailCase) -> DovetailCase:
 
 def _structure(case: DovetailCase) -> StructureLoads:
     """Return the structure of a case, cached because all rungs of a contact's ladder share it."""
-    return _last_structure(changed(case, {"contact": Contact()}))
+    return _last_structure(changed(case, {"contact": ContactSection()}))
 
 
 @lru_cache(1)

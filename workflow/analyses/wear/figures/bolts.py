@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import WearContents
 from workflow.pictures.panels import (
     blocks,
     changes,
@@ -19,7 +19,7 @@ from workflow.pictures.panels import (
 from workflow.pictures.style import BLUE, HEADROOM, ORANGE
 
 
-def bolts(file: h5py.File, contents: Contents) -> Figure:
+def bolts(file: h5py.File, contents: WearContents) -> Figure:
     """Draw the tension at peak load over the cycles, and in each increment, unworn and worn."""
     groups = {name: file["bolts"][name] for name in contents.bolts}
     cycles, unit = file["kinetics/cycles"][()], f" N{contents.per}"

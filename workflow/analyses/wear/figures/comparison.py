@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import WearContents
 from workflow.pictures.fields import PROFILE_MARGIN, centres, middle, near_middle, view_of
 from workflow.pictures.panels import (
     blocks,
@@ -33,7 +33,7 @@ FIELDS = PRESSURE, SHEAR, ("slip", "slip x [µm]", TO_MICRONS)
 NOTHING = 1e-4
 
 
-def half_space_and_structure(file: h5py.File, contents: Contents) -> Figure:
+def half_space_and_structure(file: h5py.File, contents: WearContents) -> Figure:
     """Draw Qx and Mz by increment, then p, qx and slip along x in some increments."""
     names, place = contents.names, "" if contents.line else " at y = 0"
     loads = _shown_loads(file, contents)
@@ -55,7 +55,7 @@ def half_space_and_structure(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def _cut(axes: Iterable[Axes], file: h5py.File, contents: Contents) -> None:
+def _cut(axes: Iterable[Axes], file: h5py.File, contents: WearContents) -> None:
     """Limit the axes to the contact and a margin."""
     views = [
         view_of(
@@ -75,7 +75,7 @@ def _compared(file: h5py.File, interface: str) -> dict[str, h5py.Group]:
     return {key: group for key, group in groups.items() if key != "load_history"}
 
 
-def _shown_loads(file: h5py.File, contents: Contents) -> list[tuple[str, float, str]]:
+def _shown_loads(file: h5py.File, contents: WearContents) -> list[tuple[str, float, str]]:
     """Return name, scale and unit of the resultants that are not negligible."""
     histories = [
         file[f"{group}/{name}/load_history"]
@@ -95,7 +95,7 @@ def _shown_loads(file: h5py.File, contents: Contents) -> list[tuple[str, float, 
 
 
 def _draw_loads(
-    axis: Axes, file: h5py.File, contents: Contents, interface: str, name: str, scale: float
+    axis: Axes, file: h5py.File, contents: WearContents, interface: str, name: str, scale: float
 ) -> None:
     structure = file[f"structure/{interface}/load_history"]
     half_space = file[f"comparison/{interface}/load_history"]
@@ -115,7 +115,7 @@ def _draw_loads(
 
 
 def _draw_profiles(
-    axis: Axes, file: h5py.File, contents: Contents, interface: str, name: str, scale: float
+    axis: Axes, file: h5py.File, contents: WearContents, interface: str, name: str, scale: float
 ) -> None:
     grid, compared = grid_of(file["grid"][interface]), _compared(file, interface)
     for (key, group), colour in zip(compared.items(), COLOURS, strict=False):
@@ -139,7 +139,7 @@ def nodes_on_middle(
     return coordinates[near, direction], (field if field.ndim == 1 else field[0])[near]
 
 
-def _largest_difference(file: h5py.File, contents: Contents) -> str:
+def _largest_difference(file: h5py.File, contents: WearContents) -> str:
     """Return the title: the largest difference of Q between half-space and structure."""
     largest = 0.0
     for interface in file["comparison"]:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.wear.layout import PARTS, RESULTS, Contents
+from workflow.analyses.wear.layout import PARTS, RESULTS, WearContents
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
 
@@ -18,7 +18,7 @@ COLOURS = dict(zip(PARTS, (BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK), stri
 HEIGHT = 0.55
 
 
-def error_budget(file: h5py.File, contents: Contents) -> Figure:
+def error_budget(file: h5py.File, contents: WearContents) -> Figure:
     """Draw bars of the parts of every error, with a panel for each contact and each body."""
     panels = [(name, file["error"][name]) for name in contents.names]
     if contents.structure:

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import WearContents
 from workflow.analyses.wear.loop_table import SLIDES
 from workflow.pictures.panels import (
     blocks,
@@ -34,7 +34,7 @@ SHOWN = {"kt": PER_MICRON, "mu": 1.0, "energy_per_loop": 1.0}
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK)
 
 
-def loops(file: h5py.File, contents: Contents) -> Figure:
+def loops(file: h5py.File, contents: WearContents) -> Figure:
     """Draw loops at several numbers of cycles, and below them stiffness and energy over wear."""
     groups, per = file["loops"], contents.per
     ends = {name: PER_MICRON * _column(group, "kt")[[0, -1]] for name, group in groups.items()}

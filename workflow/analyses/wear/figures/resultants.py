@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Mask
-from workflow.analyses.wear.layout import Contents, energy_name
+from workflow.analyses.wear.layout import WearContents, energy_name
 from workflow.pictures.panels import (
     blocks,
     change,
@@ -31,7 +31,7 @@ MOST_RANGES = 4
 NOTHING = 1e-9
 
 
-def resultants(file: h5py.File, contents: Contents) -> Figure:
+def resultants(file: h5py.File, contents: WearContents) -> Figure:
     """Draw P, Qx within the Coulomb limits, and energy per increment, one column per interface.
 
     Energies are left out where nothing is dissipated.
@@ -68,7 +68,7 @@ def resultants(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _energies(
-    file: h5py.File, contents: Contents, interface: str, history: dict[str, Array]
+    file: h5py.File, contents: WearContents, interface: str, history: dict[str, Array]
 ) -> tuple[Array | None, Array]:
     """Return the energies of every increment: of the loads, if known, and of the worn model.
 
@@ -86,7 +86,7 @@ def _history(file: h5py.File, interface: str) -> dict[str, Array]:
     return {k: v[()] for k, v in file["structure"][interface]["load_history"].items()}
 
 
-def _cycles_shown(file: h5py.File, contents: Contents) -> str:
+def _cycles_shown(file: h5py.File, contents: WearContents) -> str:
     """Return the cycles shown, in words: one, or a mix with its shares."""
     if not contents.mix:
         return "one cycle"
@@ -140,7 +140,7 @@ def _ranges(numbers: Iterable[Any]) -> str:
 
 
 def _draw_energy(
-    axis: Axes, increments: Array, reference: Array | None, wearing: Array, contents: Contents
+    axis: Axes, increments: Array, reference: Array | None, wearing: Array, contents: WearContents
 ) -> None:
     """Draw the energy of the loads as bars and that of the worn model as diamonds."""
     wears, loads, unit = contents.wears, contents.loads, f"mJ{contents.per}"

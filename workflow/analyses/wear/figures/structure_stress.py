@@ -13,7 +13,7 @@ from matplotlib.tri import Triangulation
 
 from sa_solver.types import Array
 from workflow.analyses.wear.body_mesh import body_mesh
-from workflow.analyses.wear.layout import MOMENTS, Contents
+from workflow.analyses.wear.layout import MOMENTS, WearContents
 from workflow.pictures.fields import scaled_panels
 from workflow.pictures.style import BLACK
 from workflow.shell.results import grid_of
@@ -43,7 +43,7 @@ class _Section(NamedTuple):
     outline: Array
 
 
-def structure_stress(file: h5py.File, contents: Contents) -> Figure:
+def structure_stress(file: h5py.File, contents: WearContents) -> Figure:
     """Draw the von Mises stress of both bodies around the faces: unworn, worn and change."""
     right, up = _shown_axes(file)
     low, high = _window(file)
@@ -66,7 +66,7 @@ def structure_stress(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def _place(file: h5py.File, contents: Contents) -> str:
+def _place(file: h5py.File, contents: WearContents) -> str:
     """Return the place of the section for the title."""
     if contents.line:
         return "in plane strain"

@@ -13,7 +13,7 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
 from sa_solver.types import Array, Grid
-from workflow.analyses.wear.layout import MOMENTS, Contents
+from workflow.analyses.wear.layout import MOMENTS, WearContents
 from workflow.pictures.fields import (
     FLAT,
     PROFILE_MARGIN,
@@ -51,7 +51,7 @@ PARAMETERS = {
 # --- sections -----------------------------------------------------------------------------------
 
 
-def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
+def subsurface_stress(file: h5py.File, contents: WearContents) -> Figure:
     """Draw the von Mises stress in the section of every contact at peak load, unworn and worn."""
     sections = file["stress/section"]
     strained = contents.strained
@@ -92,7 +92,7 @@ def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def _whose_sections(contents: Contents, begins: float) -> str:
+def _whose_sections(contents: WearContents, begins: float) -> str:
     """Return which body is where in a section that starts ``begins`` µm below the surfaces."""
     lower, upper = contents.bodies
     start = f"from {begins:.3g} µm below"
@@ -104,7 +104,7 @@ def _whose_sections(contents: Contents, begins: float) -> str:
 
 
 def _window(
-    file: h5py.File, contents: Contents, interface: str
+    file: h5py.File, contents: WearContents, interface: str
 ) -> tuple[tuple[float, float], float]:
     """Return the window of a section: along the face the contact with a margin, and the depth.
 
@@ -159,7 +159,7 @@ def _draw_yield(axis: Axes, group: h5py.Group, field: Mapping[int, Array]) -> No
 # --- fretting parameter -------------------------------------------------------------------------
 
 
-def fretting_life(file: h5py.File, contents: Contents) -> Figure:
+def fretting_life(file: h5py.File, contents: WearContents) -> Figure:
     """Draw the fretting parameter over every contact, for both bodies, unworn and worn."""
     groups = {name: file["stress/life"][name] for name in contents.cracking}
     life = groups[contents.cracking[0]].attrs

@@ -20,7 +20,7 @@ from workflow.analyses.wear.figures.loops import loops
 from workflow.analyses.wear.figures.resultants import resultants
 from workflow.analyses.wear.figures.structure_stress import structure_stress
 from workflow.analyses.wear.figures.subsurface import fretting_life, subsurface_stress
-from workflow.analyses.wear.layout import EXTRAPOLATION, Contents
+from workflow.analyses.wear.layout import EXTRAPOLATION, WearContents
 from workflow.pictures.fields import (
     MAP_PERCENTILE,
     MAX_PROFILES,
@@ -66,7 +66,7 @@ ALONG = "along x at y = 0", "along y at x = 0"
 ALONG_LINE = ("along x",)
 
 
-def figures_of(contents: Contents) -> Figures:
+def figures_of(contents: WearContents) -> Figures:
     """Return the figures of a run, by name; the most important one comes first."""
     drawn = {
         "pressure_profiles": (pressure_profiles, True),
@@ -90,7 +90,7 @@ def figures_of(contents: Contents) -> Figures:
 # --- pressure -----------------------------------------------------------------------------------
 
 
-def pressure_maps(file: h5py.File, contents: Contents) -> Figure:
+def pressure_maps(file: h5py.File, contents: WearContents) -> Figure:
     """Draw the peak-load pressure of every face, unworn and worn, on one colour scale."""
     rows, peaks = [], {}
     for name in contents.names:
@@ -113,13 +113,13 @@ def _map_title(interface: str, cycles: str, field: Array, grid: Grid) -> str:
     return f"{interface}, {cycles}: at most {field.max():.0f} MPa, {closed:.3g} mm² in contact"
 
 
-def _pressures(file: h5py.File, contents: Contents, interface: str) -> dict[str, Array]:
+def _pressures(file: h5py.File, contents: WearContents, interface: str) -> dict[str, Array]:
     """Return the pressure at peak load of the first and last jump, by jump."""
     contact = file["contact"][interface]
     return {jump: contact[jump]["pressure"][()] for jump in _ends(contents)}
 
 
-def _shown_span(file: h5py.File, contents: Contents, direction: int) -> tuple[float, float]:
+def _shown_span(file: h5py.File, contents: WearContents, direction: int) -> tuple[float, float]:
     """Return the range of contact of all faces along x (0) or y (1), with a margin [mm]."""
     views = [
         view_of(
@@ -132,7 +132,7 @@ def _shown_span(file: h5py.File, contents: Contents, direction: int) -> tuple[fl
     return min(view[direction][0] for view in views), max(view[direction][1] for view in views)
 
 
-def pressure_profiles(file: h5py.File, contents: Contents) -> Figure:
+def pressure_profiles(file: h5py.File, contents: WearContents) -> Figure:
     """Draw the peak-load pressure along both middle lines of each face, with coarse solutions."""
     names, along = contents.names, ALONG_LINE if contents.line else ALONG
     figure = new_figure(_edge_peak(file, contents), (1.0 + 4.0 * len(along)) * blocks(len(names)))
@@ -149,7 +149,7 @@ def pressure_profiles(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _draw_profile(
-    axis: Axes, file: h5py.File, contents: Contents, interface: str, direction: int
+    axis: Axes, file: h5py.File, contents: WearContents, interface: str, direction: int
 ) -> None:
     """Draw the pressure along x (``direction`` 0) or y (1) through the middle."""
     contact, grid = file["contact"][interface], grid_of(file["grid"][interface])
@@ -175,7 +175,7 @@ def _nodal_pressure(file: h5py.File, interface: str, direction: int) -> tuple[Ar
     return nodes_on_middle(file["structure"][interface], "pressure", peak, direction)
 
 
-def _edge_peak(file: h5py.File, contents: Contents) -> str:
+def _edge_peak(file: h5py.File, contents: WearContents) -> str:
     """Return the title: the pressure peak at y = 0 of the most loaded face, by every method."""
     unworn = contents.jump_names[0]
     peaks = {
@@ -198,7 +198,7 @@ def _edge_peak(file: h5py.File, contents: Contents) -> str:
 # --- wear ---------------------------------------------------------------------------------------
 
 
-def worn_profiles(file: h5py.File, contents: Contents) -> Figure:
+def worn_profiles(file: h5py.File, contents: WearContents) -> Figure:
     """Draw surfaces and worn depth along x in the middle of each face, as cycles go by."""
     names, (lower, upper) = contents.names, contents.bodies
     figure = new_figure("", 9.5 * blocks(len(names)))
@@ -224,7 +224,9 @@ def worn_profiles(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def _draw_wear(axes: Iterable[Axes], file: h5py.File, contents: Contents, interface: str) -> float:
+def _draw_wear(
+    axes: Iterable[Axes], file: h5py.File, contents: WearContents, interface: str
+) -> float:
     """Draw heights above and depths below, a colour per number of cycles; return the depth [µm]."""
     heights, depths = axes
     surfaces, x = file["surfaces"][interface], centres(grid_of(file["grid"][interface]), 0)
@@ -243,7 +245,7 @@ def _middle_heights(surfaces: h5py.Group) -> Array:
     return TO_MICRONS * np.stack([middle(surfaces[f"body_{body}"][()], 0) for body in (1, 2)])
 
 
-def kinetics(file: h5py.File, contents: Contents) -> Figure:
+def kinetics(file: h5py.File, contents: WearContents) -> Figure:
     """Draw depth, volume and area over the cycles, with linear regimes and extrapolations."""
     groups = {name: file["kinetics"][name] for name in contents.names}
     cycles, per = file["kinetics/cycles"][()], contents.per
@@ -335,7 +337,7 @@ def _regime(group: h5py.Group, cycles: Array) -> str:
 # --- reading ------------------------------------------------------------------------------------
 
 
-def _ends(contents: Contents) -> list[str]:
+def _ends(contents: WearContents) -> list[str]:
     """Return the first and last jump; only one if nothing wore."""
     return list(dict.fromkeys(jump for _, jump in contents.ends))
 

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from workflow.analyses.wear.body_mesh import body_mesh
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import WearContents
 from workflow.pictures.vtk import CYCLES, INCREMENTS, Step, attach, write_series
 
 # Fields of a body, with units; its surface over the increments has no tensors.
@@ -17,7 +17,7 @@ SURFACE = {"displacement": "mm", "von_mises": "MPa", "maximum_principal": "MPa"}
 NODAL = SURFACE | {"stress": "MPa"}
 
 
-def write_structure(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
+def write_structure(contents: WearContents, file: h5py.File, folder: Path) -> list[Path]:
     """Write the series of both bodies at peak load, and those over the increments if present."""
     bodies = _bodies(contents, file, folder / "structure")
     written = write_series(folder / "structure.pvd", CYCLES, bodies)
@@ -27,7 +27,7 @@ def write_structure(contents: Contents, file: h5py.File, folder: Path) -> list[P
     return written
 
 
-def _bodies(contents: Contents, file: h5py.File, folder: Path) -> Iterator[Step]:
+def _bodies(contents: WearContents, file: h5py.File, folder: Path) -> Iterator[Step]:
     """Yield all bodies at peak load, unworn and worn, with nodal displacement and stresses."""
     cycles = file["kinetics/cycles"][()]
     for (state, _), time in zip(contents.states, cycles[[0, -1]].tolist(), strict=False):

@@ -11,7 +11,7 @@ import numpy as np
 
 from fe_models.elasticity.stress import turned
 from sa_solver.types import Array, Frame
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import WearContents
 from workflow.pictures.vtk import (
     CYCLES,
     FacePoints,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def write_life(
-    contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
+    contents: WearContents, file: h5py.File, interface: str, points: FacePoints, folder: Path
 ) -> list[Path]:
     """Write maps of the fretting parameter and its factors, unworn and worn, by body."""
     if interface not in contents.life:
@@ -38,7 +38,7 @@ def write_life(
 
 
 def _maps(
-    contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
+    contents: WearContents, file: h5py.File, interface: str, points: FacePoints, folder: Path
 ) -> Iterator[Step]:
     contact, life = file["contact"][interface], file["stress/life"][interface]
     for state, jump in contents.states:
@@ -51,7 +51,9 @@ def _maps(
         yield float(contact[jump].attrs["cycles"]), interface, path, points.mesh(fields)
 
 
-def write_sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> list[Path]:
+def write_sections(
+    contents: WearContents, file: h5py.File, interface: str, folder: Path
+) -> list[Path]:
     """Write the section through the bodies, unworn and worn, and the series that lists them."""
     if not contents.sections:
         return []
@@ -59,7 +61,9 @@ def write_sections(contents: Contents, file: h5py.File, interface: str, folder: 
     return write_series(path, CYCLES, _sections(contents, file, interface, folder / "section"))
 
 
-def _sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> Iterator[Step]:
+def _sections(
+    contents: WearContents, file: h5py.File, interface: str, folder: Path
+) -> Iterator[Step]:
     frame = frame_of(file["grid"][interface])
     contact, section = file["contact"][interface], file["stress/section"][interface]
     for state, jump in contents.states:

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import h5py
 
-from workflow.analyses.wear.layout import Contents
-from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
+from workflow.analyses.wear.layout import WearContents
+from workflow.pictures.view import FIRST, PictureScene, Shown, View, write_view
 from workflow.pictures.vtk import CYCLES, INCREMENTS, PROFILE
 
 DISPLACED = "displacement [mm]"
 VON_MISES = "von_mises [MPa]"
 
 
-def write_views(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
+def write_views(contents: WearContents, file: h5py.File, folder: Path) -> list[Path]:
     """Write the scripts and return their paths."""
     title, cycles = str(file.attrs["title"]), file["kinetics/cycles"][()]
-    wear = Scene(title, CYCLES, float(cycles[-1]), list(_views_of_wear(contents, file)))
+    wear = PictureScene(title, CYCLES, float(cycles[-1]), list(_views_of_wear(contents, file)))
     written = [write_view(wear, folder / FIRST)]
     if contents.mission:
         peak = float(file.attrs["peak_increment"]) + 1.0
@@ -26,12 +26,12 @@ def write_views(contents: Contents, file: h5py.File, folder: Path) -> list[Path]
             View(f"Structure, {state}", [Shown(f"mission_{state}.pvd", VON_MISES, DISPLACED)])
             for state, _ in contents.states
         ]
-        mission = Scene(title, INCREMENTS, peak, views)
+        mission = PictureScene(title, INCREMENTS, peak, views)
         written.append(write_view(mission, folder / "view_mission.py"))
     return written
 
 
-def _views_of_wear(contents: Contents, file: h5py.File) -> Iterator[View]:
+def _views_of_wear(contents: WearContents, file: h5py.File) -> Iterator[View]:
     if contents.structure:
         yield View("Structure at peak load", [Shown("structure.pvd", VON_MISES, DISPLACED)])
     series = [(name, f"{name}.pvd") for name in contents.names]

@@ -28,7 +28,7 @@ import numpy as np
 from fe_models.meshes.structure_mesh import Face
 from fe_models.meshes.transfer import FaceTransfer
 from workflow.analyses.wear.datasets import OTHER_FACE
-from workflow.analyses.wear.layout import Contents, jump_name
+from workflow.analyses.wear.layout import WearContents, jump_name
 from workflow.analyses.wear.paraview.structure import write_structure
 from workflow.analyses.wear.paraview.subsurface import write_life, write_sections
 from workflow.analyses.wear.paraview.views import write_views
@@ -44,7 +44,7 @@ from workflow.pictures.vtk import (
 from workflow.shell.results import frame_of, grid_of
 
 
-def write_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
+def write_wear(contents: WearContents, file: h5py.File, folder: Path) -> list[Path]:
     """Write the files that show a wear run, and return their paths."""
     written: list[Path] = []
     for name in contents.names:
@@ -77,7 +77,7 @@ def _face_points(file: h5py.File, interface: str) -> FacePoints:
 
 
 def _faces(
-    contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
+    contents: WearContents, file: h5py.File, interface: str, points: FacePoints, folder: Path
 ) -> Iterator[Step]:
     """Yield one face after every jump."""
     contact, surfaces = file["contact"][interface], file["surfaces"][interface]
@@ -105,7 +105,7 @@ def _surface_fields(surfaces: h5py.Group, jump: str, points: FacePoints) -> Fiel
 
 
 def _write_worn_surfaces(
-    contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
+    contents: WearContents, file: h5py.File, interface: str, points: FacePoints, folder: Path
 ) -> list[Path]:
     """Write STL files of both worn surfaces of one face, for CAD and meshers.
 

@@ -40,7 +40,7 @@ from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.surfaces import KEY
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.scanned import ScannedFace
-from workflow.analyses.wear.case.sections import Contact, Cycles, PressingForce, Wear
+from workflow.analyses.wear.case.sections import ContactSection, Cycles, PressingForce, WearSection
 from workflow.case.doubts import heights, long_stroke
 from workflow.case.fields import Quantity, Whole
 from workflow.case.input_files import read_heights
@@ -157,7 +157,7 @@ class LineReciprocation(Stroke):
         return to_and_fro(self.P, self.stroke, self.increments)
 
 
-class Cycle(LegsOrFile[LegT], Generic[LegT]):
+class ClosedCycle(LegsOrFile[LegT], Generic[LegT]):
     """Forces and motions of a closed cycle: the first leg begins where the last one ends."""
 
     closed: ClassVar[bool] = True
@@ -179,11 +179,11 @@ class Cycle(LegsOrFile[LegT], Generic[LegT]):
         return self
 
 
-class ContactCycle(Cycle[Leg]):
+class ForcedCycle(ClosedCycle[Leg]):
     """Closed cycle of any loads; all but motions along the face need ``contact.method: full``."""
 
 
-class LineContactCycle(Cycle[LineLeg]):
+class LineContactCycle(ClosedCycle[LineLeg]):
     """Closed cycle of any loads; all but motions along the face need ``contact.method: full``."""
 
 
@@ -192,11 +192,11 @@ def _way(value: object) -> str:
     if isinstance(value, Section):
         return "(stroke)" if isinstance(value, Stroke) else "(cycle)"
     named = set(value) if isinstance(value, dict) else set()
-    return "(cycle)" if Cycle.known_by & named and not Stroke.known_by & named else "(stroke)"
+    return "(cycle)" if ClosedCycle.known_by & named and not Stroke.known_by & named else "(stroke)"
 
 
 LoadPath = Annotated[
-    Annotated[Reciprocation, Tag("(stroke)")] | Annotated[ContactCycle, Tag("(cycle)")],
+    Annotated[Reciprocation, Tag("(stroke)")] | Annotated[ForcedCycle, Tag("(cycle)")],
     Discriminator(_way),
 ]
 LineLoadPath = Annotated[
@@ -217,13 +217,13 @@ SPLIT = "in parts until they leave {} of depth and energy (contact.accuracy)"
 LINK = "there is no structure to link the contact to: both bodies are half-spaces"
 
 
-class BodiesWear(Wear):
+class BodiesWear(WearSection):
     """Wear laws of two bodies, and length of the run."""
 
     cycles: Cycles = entry("of the whole run [1]", 1e5)
 
 
-class WearGrid(Contact):
+class WearGrid(ContactSection):
     """Half-space solution on a grid centred on body 2, which moves with it."""
 
     grid: tuple[GridCells, GridCells] = entry(
@@ -239,7 +239,7 @@ class WearGrid(Contact):
     link: Literal["half_space"] = entry(LINK, "half_space", default="half_space")
 
 
-class LineWearGrid(Contact):
+class LineWearGrid(ContactSection):
     """Half-plane solution on strips centred on body 2, which move with it."""
 
     grid: LineCells = entry(

@@ -57,7 +57,7 @@ LegIncrements = Annotated[int, Whole(1, 10_000)]
 FlankNodes = Annotated[int, Whole(3, 2000)]
 
 
-class Dovetail(Section):
+class DovetailSection(Section):
     """Blade root in a disk sector, in contact along two flanks (dovetail attachment)."""
 
     in_schema: ClassVar[Mapping[str, Any]] = together("end_width", "end_radius")
@@ -128,7 +128,7 @@ class Dovetail(Section):
         return self.neck_width + 2.0 * self.face_width * sin(self.flank_angle)
 
     @model_validator(mode="after")
-    def _plane_is_straight(self) -> Dovetail:
+    def _plane_is_straight(self) -> DovetailSection:
         if self.dimension == 2 and self.skew != 0.0:
             raise disagreement(
                 "2: a skewed slot is not the same all along; allowed: dimension 3, or skew 0",
@@ -137,7 +137,7 @@ class Dovetail(Section):
         return self
 
     @model_validator(mode="after")
-    def _sides_are_images(self) -> Dovetail:
+    def _sides_are_images(self) -> DovetailSection:
         if self.sides == "cyclic" and self.skew != 0.0:
             raise disagreement(
                 "cyclic: the sides of a skewed slot's sector, which ends in planes, are no images "
@@ -147,7 +147,7 @@ class Dovetail(Section):
         return self
 
     @model_validator(mode="after")
-    def _roundings_fit(self) -> Dovetail:
+    def _roundings_fit(self) -> DovetailSection:
         check_arcs(self)
         _require_below(self, "edge_width", self.flank_length / 2, "half the flank_length")
         if self.end_width is not None:
@@ -161,7 +161,7 @@ class Dovetail(Section):
         return self
 
     @model_validator(mode="after")
-    def _root_fits_sector(self) -> Dovetail:
+    def _root_fits_sector(self) -> DovetailSection:
         _require_below(self, "disk_height", self.rim_radius, "the rim_radius")
         depth = self.face_depth + self.slot_fillet
         if depth >= self.disk_height:
@@ -182,7 +182,7 @@ class Dovetail(Section):
         return self
 
     @model_validator(mode="after")
-    def _can_be_drawn(self) -> Dovetail:
+    def _can_be_drawn(self) -> DovetailSection:
         try:
             self.geometry().check()
         except MeshError as error:
@@ -322,7 +322,9 @@ class DovetailCase(FiniteElementCase):
 
     bodies: ClassVar[tuple[str, str]] = ("disk", "blade")
 
-    structure: Dovetail = entry("lengths in the section across the slot unless named otherwise")
+    structure: DovetailSection = entry(
+        "lengths in the section across the slot unless named otherwise"
+    )
     materials: BladeAndDiskMaterials = entry("the two bodies in contact")
     load_path: LoadPath = entry("one cycle")
     mesh: Mesh = entry("finite elements of the structure", default=Mesh())

@@ -22,14 +22,14 @@ from workflow.analyses.wear.case.gaps import check_gap
 from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.case.sections import (
     TwoBodies,
-    Wear,
+    WearSection,
     check_rows,
 )
 from workflow.analyses.wear.structures.mesh.contacts import (
-    ContactPair,
+    ContactPairSection,
     MeshMaterial,
     OtherBody,
-    Support,
+    SupportSection,
     own_terms,
 )
 from workflow.analyses.wear.structures.mesh.cyclic import CyclicCuts, check_sector
@@ -94,8 +94,8 @@ class ImportedStructure(Section):
     body_1: Name = entry("name in the file of the lower, fixed body", "disk")
     body_2: Name = entry("name in the file of the upper, moving body", "blade")
     other_bodies: tuple[OtherBody, ...] = entry("beside body 1 and body 2", default=())
-    contacts: tuple[ContactPair, ...] = entry("faces that meet", min_length=1)
-    supports: tuple[Support, ...] = entry("what is held", min_length=1)
+    contacts: tuple[ContactPairSection, ...] = entry("faces that meet", min_length=1)
+    supports: tuple[SupportSection, ...] = entry("what is held", min_length=1)
     loads: tuple[Load, ...] = entry("what is applied", min_length=1)
     cyclic: tuple[CyclicCuts, ...] = entry(
         "cuts of bodies that are a sector of a wheel, tied to each other", default=()
@@ -139,7 +139,7 @@ class ImportedStructure(Section):
         """Names of all bodies in the file, in the order of the mesh."""
         return self.body_1, self.body_2, *(body.name for body in self.other_bodies)
 
-    def bodies_of(self, pair: ContactPair) -> tuple[str, str]:
+    def bodies_of(self, pair: ContactPairSection) -> tuple[str, str]:
         """Return the names of body 1 and body 2 of a contact."""
         return pair.bodies or (self.body_1, self.body_2)
 
@@ -205,7 +205,7 @@ class MeshCase(FiniteElementCase):
     materials: MeshMaterials = entry("body 1 and body 2")
     load_path: Legs = entry("one cycle")
     mesh: Elements = entry("finite elements of the structure", default=Elements())
-    wear: Wear = entry("law, length of the run and step")
+    wear: WearSection = entry("law, length of the run and step")
 
     @property
     def cores(self) -> int:

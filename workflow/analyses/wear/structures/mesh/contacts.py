@@ -53,7 +53,7 @@ class ContactWear(Laws, TwoBodies[BodyWear]):
     """Laws of the two bodies of a contact."""
 
 
-class ContactPair(Section):
+class ContactPairSection(Section):
     """Two faces that meet; their meshes need not match."""
 
     name: Name = entry("of the interface in all results", "pad")
@@ -85,13 +85,13 @@ class ContactPair(Section):
     )
 
     @model_validator(mode="after")
-    def _has_two_bodies(self) -> ContactPair:
+    def _has_two_bodies(self) -> ContactPairSection:
         if self.bodies is not None and self.bodies[0] == self.bodies[1]:
             raise disagreement("the same body twice; allowed: two bodies", "bodies")
         return self
 
     @model_validator(mode="after")
-    def _has_faces(self) -> ContactPair:
+    def _has_faces(self) -> ContactPairSection:
         for key in ("face_1", "face_2"):
             names = getattr(self, key)
             if not names:
@@ -107,7 +107,7 @@ class ContactPair(Section):
         return Pair(self.name, bodies, self.face_1, self.face_2, np.array(self.x))
 
 
-def own_terms(pair: ContactPair) -> str:
+def own_terms(pair: ContactPairSection) -> str:
     """Return the settings specific to a contact, in words; empty if there are none."""
     parts = []
     if pair.bodies is not None:
@@ -124,7 +124,7 @@ def own_terms(pair: ContactPair) -> str:
     return f"{pair.name}: {', '.join(parts)}" if parts else ""
 
 
-class Support(Section):
+class SupportSection(Section):
     """Displacements held at a boundary or a node set of any body."""
 
     group: Name = entry("boundary or node set", "disk_base")

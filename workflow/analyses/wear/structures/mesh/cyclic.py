@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fe_models.cyclic import cuts as fe
     from fe_models.meshes.structure_mesh import StructureMesh
     from sa_solver.types import Indices
-    from workflow.analyses.wear.structures.mesh.contacts import Support
+    from workflow.analyses.wear.structures.mesh.contacts import SupportSection
     from workflow.analyses.wear.structures.mesh.loads import Load
 
 # Distance between matching cuts [mm] up to which they count as exact and nothing is reported.
@@ -76,7 +76,7 @@ class _Structure(Protocol):
     @property
     def cyclic(self) -> Sequence[CyclicCuts]: ...
     @property
-    def supports(self) -> Sequence[Support]: ...
+    def supports(self) -> Sequence[SupportSection]: ...
     @property
     def loads(self) -> Sequence[Load]: ...
 

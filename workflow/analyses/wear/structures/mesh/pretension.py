@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import model_validator
 
-from workflow.analyses.wear.case.sections import Nonlinearity, PressingForce
+from workflow.analyses.wear.case.sections import NonlinearitySection, PressingForce
 from workflow.analyses.wear.structures.mesh.legs import Legs
 from workflow.analyses.wear.structures.mesh.load import (
     KINDS,
@@ -90,7 +90,7 @@ class ShorteningLoad(BoltLoad):
     shortening: Shortening = entry("of the shank [mm]", "20 um")
 
 
-def check_bolts(loads: Sequence[MeshLoad], path: Legs, nonlinearity: Nonlinearity) -> None:
+def check_bolts(loads: Sequence[MeshLoad], path: Legs, nonlinearity: NonlinearitySection) -> None:
     """Refuse bolts with equal names, bolts tightened in every cycle, and nonlinear structures."""
     bolts = {i: load for i, load in enumerate(loads) if isinstance(load, BoltLoad)}
     names = [bolt.name for bolt in bolts.values()]

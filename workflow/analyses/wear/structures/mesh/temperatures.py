@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import model_validator
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.wear.case.sections import Nonlinearity
+from workflow.analyses.wear.case.sections import NonlinearitySection
 from workflow.analyses.wear.structures.mesh.load import KINDS, MeshLoad, Name
 from workflow.case.fields import File, Quantity
 from workflow.case.input_files import InputFileError
@@ -93,7 +93,7 @@ class NodalTemperatureLoad(_Temperature):
 def check_temperatures(
     loads: Sequence[MeshLoad],
     materials: Mapping[str, tuple[str, float | None]],
-    nonlinearity: Nonlinearity,
+    nonlinearity: NonlinearitySection,
     size: float | None,
 ) -> None:
     """Refuse temperatures of bodies without expansion, and of nonlinear structures.

@@ -15,7 +15,7 @@ from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.analyses.wear.case.base import WearCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_gap
 from workflow.analyses.wear.case.scanned import ScannedFace
-from workflow.analyses.wear.case.sections import Contact, TwoBodies, Wear, check_rows
+from workflow.analyses.wear.case.sections import ContactSection, TwoBodies, WearSection, check_rows
 from workflow.analyses.wear.structures.resultants.faces import FaceError
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
 from workflow.case.doubts import pressed, uneven_cells
@@ -186,7 +186,7 @@ class Resultants(Section):
         return {name: loads[name] for name in names}
 
 
-class ImportedContact(Contact):
+class ImportedContact(ContactSection):
     """Half-space solution on a grid over each contact face."""
 
     method: Literal["normal", "full"] = entry(
@@ -196,7 +196,7 @@ class ImportedContact(Contact):
     )
 
 
-class BodyMaterials(TwoBodies[BodyMaterial]):
+class SurfaceMaterials(TwoBodies[BodyMaterial]):
     """The two bodies in contact."""
 
 
@@ -210,11 +210,11 @@ class ResultantsCase(WearCase):
 
     title: Title = entry("one line", "Contacts under loads of another code")
     structure: Resultants = entry("the loads, and the faces they press")
-    materials: BodyMaterials = entry("the two bodies in contact")
+    materials: SurfaceMaterials = entry("the two bodies in contact")
     contact: ImportedContact = entry(
         "half-space grid over each contact face", default=ImportedContact()
     )
-    wear: Wear = entry("law, length of the run and step")
+    wear: WearSection = entry("law, length of the run and step")
 
     def loads(self) -> dict[str, ImportedLoads]:
         """Return the loads of the interfaces in use, by name. Raises InputFileError."""

@@ -40,7 +40,7 @@ ADD_UP = 0.01
 
 
 @dataclass(frozen=True)
-class Group:
+class FileGroup:
     """A group of an open file, whose errors name the place in the file."""
 
     file: str
@@ -105,7 +105,7 @@ def read_h5(
                 f"{file}: /{group}: no interfaces; allowed: a group for each, with a group "
                 f"{LOADS} in it; at the top: {', '.join(opened) or 'nothing'}"
             )
-        read = {name: _read(Group(file, item), bounds(name), line) for name, item in interfaces}
+        read = {name: _read(FileGroup(file, item), bounds(name), line) for name, item in interfaces}
     _check_counts(file, read)
     return read
 
@@ -119,11 +119,11 @@ def _check_counts(file: str, read: dict[str, ImportedLoads]) -> None:
         )
 
 
-def _read(group: Group, bounds: Bounds, line: bool) -> ImportedLoads:
+def _read(group: FileGroup, bounds: Bounds, line: bool) -> ImportedLoads:
     for name in group.group:
         if name not in (LOADS, *NODAL, *IGNORED):
             raise group.error(name, "unknown", ", ".join((LOADS, *NODAL)))
-    loads = _loads(Group(group.file, group.group[LOADS]), bounds)
+    loads = _loads(FileGroup(group.file, group.group[LOADS]), bounds)
     tilt = tilt_of(line, group.group[LOADS])
     height = group.numbers("height", "mm")
     if height is not None:
@@ -155,7 +155,7 @@ def _read(group: Group, bounds: Bounds, line: bool) -> ImportedLoads:
     )
 
 
-def _loads(group: Group, bounds: Bounds) -> LoadHistory:
+def _loads(group: FileGroup, bounds: Bounds) -> LoadHistory:
     units_of = base_units(bounds.line)
     required = required_columns(bounds.line, group.group)
     missing = [name for name in required if name not in group.group]
@@ -190,7 +190,7 @@ def _loads(group: Group, bounds: Bounds) -> LoadHistory:
 
 
 def _solution(
-    group: Group, loads: LoadHistory, count: int, line: bool
+    group: FileGroup, loads: LoadHistory, count: int, line: bool
 ) -> tuple[Array | None, Array | None]:
     """Return nodal forces and displacements ``(t, 3, n)``, both or neither."""
     shape, unit = (len(loads), 3, count), unit_in(line, "N")
@@ -210,7 +210,7 @@ def _solution(
     return force, displacement
 
 
-def _closure(group: Group) -> float | None:
+def _closure(group: FileGroup) -> float | None:
     """Return how well the cycle is closed, or None if the file does not give it."""
     written = group.group.attrs.get(CLOSURE)
     if written is None:
@@ -220,7 +220,7 @@ def _closure(group: Group) -> float | None:
     return float(written)
 
 
-def _frame(group: Group) -> Frame | None:
+def _frame(group: FileGroup) -> Frame | None:
     attributes = [name for name in ("origin", "axes") if name in group.group.attrs]
     if not attributes:
         return None
@@ -233,7 +233,7 @@ def _frame(group: Group) -> Frame | None:
         raise group.error("", str(error), allowed) from error
 
 
-def _coordinates(group: Group, line: bool) -> Array | None:
+def _coordinates(group: FileGroup, line: bool) -> Array | None:
     coordinates = group.numbers("coordinates", "mm")
     if coordinates is None:
         return None
@@ -244,7 +244,7 @@ def _coordinates(group: Group, line: bool) -> Array | None:
     return coordinates
 
 
-def _facets(group: Group, coordinates: Array, line: bool) -> Indices:
+def _facets(group: FileGroup, coordinates: Array, line: bool) -> Indices:
     facets = group.whole("facets")
     corners = 2 if line else 3
     if facets is not None and (facets.ndim != 2 or facets.shape[1] != corners):
@@ -258,7 +258,7 @@ def _facets(group: Group, coordinates: Array, line: bool) -> Indices:
     return facets
 
 
-def _nodes(group: Group, name: str, count: int) -> Indices | None:
+def _nodes(group: FileGroup, name: str, count: int) -> Indices | None:
     nodes = group.whole(name)
     if nodes is None:
         return None
