@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from workflow.models.gaps import AddedGap
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
     from workflow.models.loops import TangentialLoops
-    from workflow.models.structure import LoadCycle, Nonlinearity, StructureLoads, StructureModel
+    from workflow.models.structure import StructureLoads
+    from workflow.models.structure_model import LoadCycle, Nonlinearity, StructureModel
     from workflow.models.wear import WearModel
 
 __all__ = [
@@ -49,7 +50,8 @@ __getattr__, __dir__ = lazy_names(
         "gaps": ("AddedGap",),
         "loads": ("ContactFace", "LoadSource", "UncoupledSource"),
         "loops": ("TangentialLoops",),
-        "structure": ("LoadCycle", "Nonlinearity", "StructureLoads", "StructureModel"),
+        "structure": ("StructureLoads",),
+        "structure_model": ("LoadCycle", "Nonlinearity", "StructureModel"),
         "wear": ("WearModel",),
     },
 )

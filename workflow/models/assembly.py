@@ -35,7 +35,7 @@ from sa_solver.types import Array, Indices, Material
 from workflow.models.faces import face_size, planes_of_symmetry
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
-from workflow.models.structure import LoadCycle, Nonlinearity, Remark
+from workflow.models.structure_model import LoadCycle, Nonlinearity, Remark
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class TightenedBolt:
 class MeshAssembly:
     """Bodies of a mesh or CAD file, which touch each other, under loads.
 
-    It is a :class:`workflow.models.structure.StructureModel`.
+    It is a :class:`workflow.models.structure_model.StructureModel`.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from sa_solver.errors import InputError
 from sa_solver.types import Material
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
-from workflow.models.structure import LoadCycle, Nonlinearity, Remark
+from workflow.models.structure_model import LoadCycle, Nonlinearity, Remark
 
 SIDES = {"intrados": 1, "extrados": -1}
 """Flanks by name: the one at X > 0 and the one at X < 0."""
@@ -58,8 +58,8 @@ class DovetailMesh:
 class DovetailJoint:
     """A dovetail joint under its missions.
 
-    It is a :class:`workflow.models.structure.StructureModel`. Body 1 is the disk, body 2 the blade;
-    the interfaces are called ``intrados`` (X > 0) and ``extrados``.
+    It is a :class:`workflow.models.structure_model.StructureModel`. Body 1 is the disk, body 2 the
+    blade; the interfaces are called ``intrados`` (X > 0) and ``extrados``.
 
     Parameters
     ----------

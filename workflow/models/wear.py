@@ -15,7 +15,8 @@ from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 from workflow.models.nodal import NodalContacts
 from workflow.models.results import ResultsRecorder, WearResults
-from workflow.models.structure import StructureLoads, StructureModel, StructureStore
+from workflow.models.structure import StructureLoads
+from workflow.models.structure_model import StructureModel, StructureStore
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -62,7 +62,7 @@ def _code() -> bytes:
 class DiskStore:
     """Store of condensed bodies, joints and cycles in the cache folder.
 
-    It is a :class:`workflow.models.structure.StructureStore`.
+    It is a :class:`workflow.models.structure_model.StructureStore`.
     """
 
     def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:

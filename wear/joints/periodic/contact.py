@@ -30,7 +30,7 @@ from wear.joints.periodic.contact_slopes import (
     project_stuck,
 )
 from wear.joints.periodic.friction_path import (
-    ContactParameters,
+    ContactLaw,
     ForcePath,
     ForceSlopes,
     advance_force,
@@ -122,7 +122,7 @@ def _chain(of_x: ForceSlopes, of_y: ForceSlopes, a: Transition) -> Transition:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _state_of(contact: ContactParameters, x: float, y: float, normal: float) -> int:
+def _state_of(contact: ContactLaw, x: float, y: float, normal: float) -> int:
     """Return 0 for stick, 1 for slip and 2 for separation."""
     if normal <= 0.0:
         return 2
@@ -132,7 +132,7 @@ def _state_of(contact: ContactParameters, x: float, y: float, normal: float) -> 
 
 @compiled(nogil=True, error_model="numpy")
 def increment_of(
-    contact: ContactParameters, stretch: Stretch, path: Array, start: int, end: int
+    contact: ContactLaw, stretch: Stretch, path: Array, start: int, end: int
 ) -> ForcePath:
     """Return the straight path between two points of a path ``(t, 3)``."""
     return path_of(
@@ -147,7 +147,7 @@ def increment_of(
 
 
 @compiled(nogil=True, error_model="numpy")
-def lead_in(contact: ContactParameters, before: Array) -> Stretch:
+def lead_in(contact: ContactLaw, before: Array) -> Stretch:
     """Return the stretch at the first sample, to which a contact is driven from rest."""
     stretch, points = Stretch(0.0, 0.0), rows_from_rest(before)
     for i in range(len(before)):
@@ -158,7 +158,7 @@ def lead_in(contact: ContactParameters, before: Array) -> Stretch:
 
 @compiled(nogil=True, error_model="numpy")
 def _one_period(
-    contact: ContactParameters, stretch: Stretch, path: Array, record: ContactRecord, ended: Stretch
+    contact: ContactLaw, stretch: Stretch, path: Array, record: ContactRecord, ended: Stretch
 ) -> Stretch:
     """March one period, write forces and states, and return the stretch at its end.
 
@@ -179,7 +179,7 @@ def _one_period(
 
 
 @compiled(nogil=True, error_model="numpy")
-def _period_transition(contact: ContactParameters, stretch: Stretch, path: Array) -> Transition:
+def _period_transition(contact: ContactLaw, stretch: Stretch, path: Array) -> Transition:
     """Return A of one period."""
     samples, kept = len(path), Transition(1.0, 0.0, 0.0, 1.0)
     for step in range(1, samples + 1):
@@ -192,7 +192,7 @@ def _period_transition(contact: ContactParameters, stretch: Stretch, path: Array
 
 
 @compiled(nogil=True, error_model="numpy")
-def _unchanging(contact: ContactParameters, stretch: Stretch, path: Array) -> int:
+def _unchanging(contact: ContactLaw, stretch: Stretch, path: Array) -> int:
     """Return the state that a contact keeps over the whole period, 0 or 2 as :func:`_state_of`.
 
     It is -1 if the contact slips or changes its state. A contact that sticks at two samples also
@@ -215,7 +215,7 @@ def _unchanging(contact: ContactParameters, stretch: Stretch, path: Array) -> in
 
 @compiled(nogil=True, error_model="numpy")
 def _write_unchanging(
-    contact: ContactParameters, stretch: Stretch, path: Array, state: int, record: ContactRecord
+    contact: ContactLaw, stretch: Stretch, path: Array, state: int, record: ContactRecord
 ) -> None:
     """Write forces and states of a contact that sticks or is apart over the whole period."""
     record.states[:] = state
@@ -230,7 +230,7 @@ def _write_unchanging(
 
 @compiled(nogil=True, error_model="numpy")
 def _settle_contact(
-    contact: ContactParameters, stretch: Stretch, path: Array, settled: Array, record: ContactRecord
+    contact: ContactLaw, stretch: Stretch, path: Array, settled: Array, record: ContactRecord
 ) -> float:
     """March until the stretch repeats, and return the last change of force.
 
@@ -322,7 +322,7 @@ def _carry(
 
 @compiled(nogil=True, error_model="numpy")
 def _carry_through(
-    contact: ContactParameters, stretch: Stretch, points: Array, derivatives: Derivatives
+    contact: ContactLaw, stretch: Stretch, points: Array, derivatives: Derivatives
 ) -> tuple[Stretch, bool]:
     """Drive a contact through points and carry the derivatives; also return whether it sticks."""
     sticks, kept = True, Transition(1.0, 0.0, 0.0, 1.0)
@@ -370,7 +370,7 @@ def _make_periodic(derivatives: Derivatives) -> bool:
 
 @compiled(nogil=True, error_model="numpy")
 def _differentiate(
-    contact: ContactParameters,
+    contact: ContactLaw,
     driven: tuple[Array, Array, Array],
     lead_derivatives: Derivatives,
     derivatives: Derivatives,

@@ -410,7 +410,7 @@ def energy_lost(path: ForcePath) -> float:
     return lost + _lost_in_slip(contact, _slip(contact, held)) if held < 1.0 else lost
 
 
-class ContactParameters(NamedTuple):
+class ContactLaw(NamedTuple):
     """The parameters of one joint of :class:`wear.joints.friction_contact.FrictionContact`."""
 
     stiffness: float
@@ -421,28 +421,20 @@ class ContactParameters(NamedTuple):
 
 
 @compiled(error_model="numpy")
-def contact_of(parameters: Array) -> ContactParameters:
+def contact_of(parameters: Array) -> ContactLaw:
     """Return the contact of a row of parameters ``(5,)``."""
-    return ContactParameters(
-        parameters[0], parameters[1], parameters[2], parameters[3], parameters[4]
-    )
+    return ContactLaw(parameters[0], parameters[1], parameters[2], parameters[3], parameters[4])
 
 
 @compiled(error_model="numpy")
-def pressing(contact: ContactParameters, approach: float) -> float:
+def pressing(contact: ContactLaw, approach: float) -> float:
     """Return the normal force, which is negative where the contact is apart."""
     return contact.preload + contact.normal_stiffness * (approach - contact.gap)
 
 
 @compiled(error_model="numpy")
 def path_of(
-    contact: ContactParameters,
-    x: float,
-    y: float,
-    step_x: float,
-    step_y: float,
-    start: float,
-    end: float,
+    contact: ContactLaw, x: float, y: float, step_x: float, step_y: float, start: float, end: float
 ) -> ForcePath:
     """Return the path of a contact with the stretch (x, y) [mm] between two approaches."""
     stiffness, friction = contact.stiffness, contact.friction
@@ -498,7 +490,7 @@ def advance_contact(
 
 
 @compiled(error_model="numpy")
-def _in_displacements(contact: ContactParameters, slopes: ForceSlopes, row: Array) -> None:
+def _in_displacements(contact: ContactLaw, slopes: ForceSlopes, row: Array) -> None:
     """Write the derivatives ``(6,)`` by stretch, approach and increment."""
     limit_slope = contact.friction * contact.normal_stiffness
     row[0], row[1] = contact.stiffness * slopes.force_x, contact.stiffness * slopes.force_y

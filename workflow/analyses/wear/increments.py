@@ -29,7 +29,7 @@ from workflow.analyses.wear.fidelity.estimate import LESSER_FLANK
 from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
-from workflow.models.structure import StructureModel
+from workflow.models.structure_model import StructureModel
 
 ENTRY = "load_path.increments"
 # Least increments of a leg. Two cause 6 % of error in the depth of a dovetail but an estimate of

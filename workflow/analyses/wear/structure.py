@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from wear.contact.tractions import CycleTractions
     from workflow.models.contact import FaceContact
     from workflow.models.loads import LoadSource
-    from workflow.models.structure import StructureModel
+    from workflow.models.structure_model import StructureModel
 
 AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 

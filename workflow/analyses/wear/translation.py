@@ -10,7 +10,8 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.errors import UserError
 from workflow.models.contact import Contact, FaceContact, Wear, WearStepper
 from workflow.models.loads import ContactFace
-from workflow.models.structure import StructureLoads, StructureModel
+from workflow.models.structure import StructureLoads
+from workflow.models.structure_model import StructureModel
 from workflow.shell.cache import DiskStore
 
 AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)

@@ -29,7 +29,7 @@ from workflow.case.sections import (
 )
 
 if TYPE_CHECKING:
-    from workflow.models import structure
+    from workflow.models import structure_model
 
 # The sizes that a wear step may be given.
 SIZES = ("cycles", "depth", "volume", "fraction")
@@ -312,11 +312,11 @@ class NonlinearitySection(Section):
         beyond = {"stiffness": self.stiffness != "linear", "check": self.check}
         return tuple(key for key, asks in beyond.items() if asks)
 
-    def described(self) -> structure.Nonlinearity:
+    def described(self) -> structure_model.Nonlinearity:
         """Return the settings as the model takes them."""
-        from workflow.models import structure
+        from workflow.models import structure_model
 
-        return structure.Nonlinearity(self.stiffness, self.check)
+        return structure_model.Nonlinearity(self.stiffness, self.check)
 
 
 class Coupling(Section):

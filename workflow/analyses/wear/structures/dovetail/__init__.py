@@ -14,7 +14,7 @@ from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
     from workflow.models.contact import FaceContact
-    from workflow.models.structure import StructureModel
+    from workflow.models.structure_model import StructureModel
 
 # Stored fields per cell and increment: slips, depths per pressure, pressures, starts.
 FIELDS = 12

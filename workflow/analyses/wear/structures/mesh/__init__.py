@@ -16,7 +16,7 @@ from workflow.errors import UserError
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
-    from workflow.models.structure import StructureModel
+    from workflow.models.structure_model import StructureModel
 
 # Number of dense interface matrices held while more than two bodies are joined: 9.6 for a stack of
 # 12 blocks.

@@ -1,0 +1,175 @@
+"""Description of a structure of finite elements, and where its condensed parts are stored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from fe_models.elasticity.relinearised import Softening
+from fe_models.joints.condensation import Condensed
+from fe_models.joints.joint import JointResolvent
+from fe_models.loads.pretension import Bolt
+from fe_models.meshes.structure_mesh import Interface, StructureMesh
+from fe_models.structure import CycleSolution, Structure
+from sa_solver.types import Array, Indices
+from workflow.models.loads import ContactFace
+
+
+@dataclass(frozen=True)
+class LoadCycle:
+    """One closed cycle of the loads of a structure, such as a mission.
+
+    Parameters
+    ----------
+    amplitudes : array (t, cases)
+        Amplitudes of the load cases at the end of each increment.
+    preload : array (s, cases)
+        Amplitudes on the way to the first cycle, such as tightened bolts.
+    share : float
+        Share of all cycles that are like this one.
+    """
+
+    amplitudes: Array
+    preload: Array
+    share: float = 1.0
+
+
+@dataclass(frozen=True)
+class Nonlinearity:
+    """Geometric nonlinearity of a structure that is taken into account.
+
+    Parameters
+    ----------
+    stiffness : {"linear", "stress_stiffened", "relinearised"}
+        Stiffness of the bodies: linear; with the stress and spin of peak load; or the tangent of
+        the nonlinear structure there.
+    check : bool
+        Whether to compare with a total Lagrangian model at peak load, which takes two more
+        condensations.
+    """
+
+    stiffness: Literal["linear", "stress_stiffened", "relinearised"] = "linear"
+    check: bool = False
+
+
+class Remark(NamedTuple):
+    """A remark about a structure: a warning, or something worth knowing."""
+
+    text: str
+    is_warning: bool = True
+
+
+class StructureModel(Protocol):
+    """A structure of finite elements: its mesh, loads, supports and contact faces.
+
+    Attributes
+    ----------
+    key
+        Everything that the condensed joint depends on; equal keys mean equal joints.
+    load_cycles
+        Closed cycles of the loads: one, unless several take turns.
+    peak
+        Increment of peak load, counted from 0 over all load cycles.
+    order
+        Order of the elements.
+    tightening
+        Number of increments that tighten the bolts; 0 without bolts.
+    nonlinearity
+        Geometric nonlinearity that is taken into account.
+    finer
+        Advice on how to refine the mesh, for messages.
+    """
+
+    @property
+    def key(self) -> tuple[object, ...]: ...
+    @property
+    def load_cycles(self) -> tuple[LoadCycle, ...]: ...
+    @property
+    def peak(self) -> int: ...
+    @property
+    def order(self) -> Literal[1, 2]: ...
+    @property
+    def tightening(self) -> int: ...
+    @property
+    def nonlinearity(self) -> Nonlinearity: ...
+    @property
+    def finer(self) -> str: ...
+
+    def softening(self, structure: Structure) -> Softening:
+        """Return the spin softening of all bodies at peak load."""
+        ...
+
+    def meshed(self) -> StructureMesh:
+        """Return the unworn mesh."""
+        ...
+
+    def structure(self, mesh: StructureMesh) -> Structure:
+        """Return all bodies with supports and loads, on the unworn or a worn mesh."""
+        ...
+
+    def bolts(self, structure: Structure) -> tuple[Bolt, ...]:
+        """Return the bolts that the loads tighten."""
+        ...
+
+    def contact_face(self, interface: Interface) -> ContactFace:
+        """Return the contact face of an interface."""
+        ...
+
+    def node_numbers(self, place: int) -> Indices | None:
+        """Return the user's numbers of a body's vertices, or None where the mesh is generated.
+
+        ``place`` is the body's place among those of the mesh.
+        """
+        ...
+
+    def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterable[Remark]:
+        """Return remarks on this structure and friction for the user."""
+        ...
+
+
+class StructureStore(Protocol):
+    """Storage of condensed structures and their unworn cycles between runs."""
+
+    def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
+        """Return the condensed body made from these arrays; ``make`` it if it is not stored."""
+        ...
+
+    def joint(
+        self, key: tuple[object, ...], make: Callable[[], JointResolvent]
+    ) -> tuple[JointResolvent, bool]:
+        """Return the condensed joint of a key, and whether it was stored."""
+        ...
+
+    def cycle(
+        self,
+        key: tuple[object, ...],
+        structure: Structure,
+        friction: float | Array,
+        make: Callable[[], CycleSolution],
+    ) -> CycleSolution:
+        """Return the solved cycle of a key on its structure."""
+        ...
+
+
+class NoStore:
+    """A store without contents: everything is computed anew."""
+
+    def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
+        return make()
+
+    def joint(
+        self, key: tuple[object, ...], make: Callable[[], JointResolvent]
+    ) -> tuple[JointResolvent, bool]:
+        return make(), False
+
+    def cycle(
+        self,
+        key: tuple[object, ...],
+        structure: Structure,
+        friction: float | Array,
+        make: Callable[[], CycleSolution],
+    ) -> CycleSolution:
+        return make()
