@@ -226,7 +226,7 @@ class CoupledState:
 class Observer:
     """Base class of everything that follows a run; a subclass overrides the methods it needs.
 
-    :class:`CoupledWear` has an example; the observers of ``fretscale`` write logs and results.
+    ``CoupledWear`` has an example; the observers of ``fretscale`` write logs and results.
     """
 
     def stage(self, name: Stage) -> AbstractContextManager[object]:

@@ -129,8 +129,6 @@ class TightenedBolt:
 class MeshAssembly:
     """Bodies of a mesh or CAD file, which touch each other, under loads.
 
-    It is a :class:`workflow.models.structure_model.StructureModel`.
-
     Parameters
     ----------
     imported : ImportedMesh

@@ -58,8 +58,8 @@ class DovetailMesh:
 class DovetailJoint:
     """A dovetail joint under its missions.
 
-    It is a :class:`workflow.models.structure_model.StructureModel`. Body 1 is the disk, body 2 the
-    blade; the interfaces are called ``intrados`` (X > 0) and ``extrados``.
+    Body 1 is the disk, body 2 the blade; the interfaces are called ``intrados`` (X > 0) and
+    ``extrados``.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ class WearModel:
         -------
         xarray.DataTree
             A group for each contact face and one of the run, with units and descriptions as
-            attributes: see :class:`workflow.models.results.WearResults`.
+            attributes.
 
         Raises
         ------
