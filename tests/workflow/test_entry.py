@@ -92,8 +92,8 @@ def test_the_module_is_the_command(tmp_path):
 IN_A_PROCESS = """
 print("once")
 from contextlib import closing
-from workflow.shell.processes import Beside
-with closing(Beside()) as beside:
+from workflow.shell.processes import WorkerProcess
+with closing(WorkerProcess()) as beside:
     beside.begin(print, "in a process")()
 """
 # Contacts have a process each, and so have figures.
