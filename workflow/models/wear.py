@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from fe_models.solvers.blas_threads import one_thread
 from sa_solver.errors import InputError
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, Observer
 from workflow.models.contact import Contact, FaceContact, Wear
@@ -132,16 +133,18 @@ class WearModel:
         """
         loads = self.loads(store)
         loads.prepare()
-        unworn = loads.unworn()
-        contacts = self.face_contacts(loads)
-        recorder = ResultsRecorder(contacts, loads.peak)
-        loop = self.loop(loads, contacts, [*observers, recorder])
-        state, _ = loop.begin(unworn)
-        if start is not None:
-            check_start(start, state)
-            state = contacts.restored(start)
-        *_, end = state, *loop.march(state)
-        return WearResults(recorder, end, unworn, loads.line).tree()
+        # The matrices of contacts and increments are small: threads would only cost time.
+        with one_thread():
+            unworn = loads.unworn()
+            contacts = self.face_contacts(loads)
+            recorder = ResultsRecorder(contacts, loads.peak)
+            loop = self.loop(loads, contacts, [*observers, recorder])
+            state, _ = loop.begin(unworn)
+            if start is not None:
+                check_start(start, state)
+                state = contacts.restored(start)
+            *_, end = state, *loop.march(state)
+            return WearResults(recorder, end, unworn, loads.line).tree()
 
 
 def check_start(start: CoupledState, unworn: CoupledState) -> None:
