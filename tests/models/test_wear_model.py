@@ -133,6 +133,34 @@ def test_a_state_of_another_model_is_refused(tmp_path, model):
         checkpoint.state()
 
 
+def test_a_contact_at_the_border_is_warned_of(model):
+    own = script("own_loads")
+
+    class Small(own.Reciprocation):
+        faces = (
+            fretscale.ContactFace.nominal("pad", (0.12, 1.0), lambda x, y: x**2 / 20.0, line=True),
+        )
+
+    still = fretscale.Wear(cycles=10.0, motion="neglect")
+    small = fretscale.WearModel(Small(), model.contacts, still)
+    with pytest.warns(UserWarning, match="pad: the contact reaches the border of its grid"):
+        small.run()
+
+
+def test_errors_of_the_steps_are_near_the_true_ones():
+    """Automatic steps at 1 % report the change that steps of a tenth of the tolerance make."""
+    own = script("own_loads")
+    coarse, fine = (
+        fretscale.WearModel(
+            own.Reciprocation(), own.contact, fretscale.Wear(2000.0, tolerance=t)
+        ).run()["pad"]
+        for t in (0.03, 0.0003)
+    )
+    depth, exact = (face["depth_1"].isel(cycles=-1).values for face in (coarse, fine))
+    true = np.linalg.norm(depth - exact) / np.linalg.norm(exact)
+    assert coarse.attrs["depth_error_by_steps"] == pytest.approx(true, rel=0.5)
+
+
 def test_cases_without_a_model_are_refused():
     with pytest.raises(fretscale.UserError, match="only the wear of contacts"):
         fretscale.wear_model(CASES / "sphere_normal.yaml")

@@ -13,6 +13,7 @@ from wear.contact.contacts import KINETICS
 from wear.contact.face_loads import FaceLoads
 from wear.contact.tractions import ContactFields
 from wear.coupled import CoupledState, Observer
+from wear.steps.step_errors import step_errors
 from wear.surfaces import Surfaces
 from workflow.models.contacts import FaceContacts
 
@@ -96,7 +97,8 @@ class WearResults:
     The tree has a group for each contact face, by its name: fields over ``x`` and ``y`` of the face
     after every jump (``cycles``), depths, volumes and energy, and the resultants of the closed
     cycle, ``unworn`` and at the end (``state``). In a ``line`` contact forces, moments, energies
-    and volumes are per length.
+    and volumes are per length. Attributes of a face are the relative errors of depth and volume due
+    to the wear steps; what mesh, grid and increments leave is estimated by ``fretscale run`` only.
     """
 
     recorder: ResultsRecorder
@@ -151,7 +153,13 @@ class WearResults:
             "component": ("component", ["x", "y"]),
             "state": ("state", ["unworn", "worn"]),
         }
-        return xr.Dataset(variables, coords=coordinates)
+        return xr.Dataset(variables, coords=coordinates, attrs=self._step_errors(number))
+
+    def _step_errors(self, number: int) -> dict[str, float]:
+        """Return the relative errors of depth and volume due to the wear steps, where known."""
+        contact, state = self.recorder.contacts.stages[number], self.state.interfaces[number]
+        errors = step_errors(state, contact.areas) or {}
+        return {f"{name}_error_by_steps": error for name, error in errors.items()}
 
     def _recorded(self, of_all_jumps: Array) -> Array:
         """Return the rows of the jumps that were recorded; for a resumed run, the last ones."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from fe_models.solvers.blas_threads import one_thread
 from sa_solver.errors import InputError
+from wear.contact.interface import FirstContact
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, Observer
 from workflow.models.contact import Contact, FaceContact, Wear
 from workflow.models.contacts import FaceContacts
@@ -21,6 +23,10 @@ from workflow.models.structure_model import StructureModel, StructureStore
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+class ModelWarning(UserWarning):
+    """Warning about a model whose results are computed, but may be wrong."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +130,11 @@ class WearModel:
             A group for each contact face and one of the run, with units and descriptions as
             attributes.
 
+        Warns
+        -----
+        ModelWarning
+            A contact reaches the border of its grid, or the structure has an obvious fault.
+
         Raises
         ------
         InputError
@@ -139,12 +150,28 @@ class WearModel:
             contacts = self.face_contacts(loads)
             recorder = ResultsRecorder(contacts, loads.peak)
             loop = self.loop(loads, contacts, [*observers, recorder])
-            state, _ = loop.begin(unworn)
+            state, first = loop.begin(unworn)
+            for message in _warnings(loads, contacts, first):
+                warnings.warn(message, ModelWarning, stacklevel=2)
             if start is not None:
                 check_start(start, state)
                 state = contacts.restored(start)
             *_, end = state, *loop.march(state)
             return WearResults(recorder, end, unworn, loads.line).tree()
+
+
+def _warnings(
+    loads: LoadSource, contacts: FaceContacts, first: Sequence[FirstContact]
+) -> Iterator[str]:
+    """Return what makes results wrong though all solvers converge."""
+    if isinstance(loads, StructureLoads):
+        yield from (remark.text for remark in loads.remarks() if remark.is_warning)
+    for contact, found in zip(contacts.stages, first, strict=True):
+        if found.touches_border:
+            yield (
+                f"{contact.name}: the contact reaches the border of its grid, which cuts it off: "
+                f"{contact.remedy}"
+            )
 
 
 def check_start(start: CoupledState, unworn: CoupledState) -> None:
