@@ -344,7 +344,7 @@ class SupportedBody:
 
     @property
     def is_held(self) -> bool:
-        """Whether supports alone hold the body."""
+        """True if supports alone hold the body."""
         return self._rigid.shape[1] == 0
 
     @property
@@ -382,7 +382,7 @@ class SupportedBody:
 
     @property
     def expands(self) -> bool:
-        """Whether any load case has thermal expansion."""
+        """True if any load case has thermal expansion."""
         return self._thermal is not None and bool(self._thermal.any())
 
     def nodal_loads(self) -> Array:

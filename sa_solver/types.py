@@ -215,7 +215,7 @@ class ElasticPair:
 
     @property
     def similar(self) -> bool:
-        """Whether pressure and shear do not influence each other."""
+        """True if pressure and shear do not influence each other."""
         return abs(self.dundurs_beta) <= ALIKE
 
 
@@ -491,7 +491,7 @@ class LoadHistory:
 
     @property
     def mixed(self) -> bool:
-        """Whether the history has more than one cycle, or shares other than 1."""
+        """True if the history has more than one cycle, or shares other than 1."""
         return bool(self.block.any() or np.any(self.share != 1.0))
 
     @property

@@ -133,7 +133,7 @@ class Scar:
 
     @property
     def sure(self) -> bool:
-        """Whether the rim has noise and enough independent patches to know it."""
+        """True if the rim has noise and enough independent patches to know it."""
         return self.patches is not None and self.patches >= FEWEST_PATCHES
 
     @property

@@ -81,7 +81,7 @@ class WornState:
 
     @property
     def half_way(self) -> bool:
-        """Whether the coarse companion has done only the first half of its step."""
+        """True if the coarse companion has done only the first half of its step."""
         return self.companion.coarse is not None
 
     @property

@@ -63,7 +63,7 @@ class PeakStress:
 
     @property
     def bounded(self) -> bool:
-        """Whether the stress converges to a bounded value under mesh refinement."""
+        """True if the stress converges to a bounded value under mesh refinement."""
         return self.error < 1.0
 
 

@@ -188,7 +188,7 @@ class Face:
 
     @property
     def line(self) -> bool:
-        """Whether it is the face of a line contact, where forces are per length."""
+        """True if it is the face of a line contact, where forces are per length."""
         return self.facets.shape[1] == 2
 
     @property

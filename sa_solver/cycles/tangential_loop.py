@@ -211,7 +211,7 @@ class TangentialLoop:
 
     @property
     def slides(self) -> bool:
-        """Whether the whole contact slides at the ends of the branches."""
+        """True if the whole contact slides at the ends of the branches."""
         return self.sliding >= 1.0
 
     @property

@@ -130,7 +130,7 @@ class NormalState:
 
     @property
     def touches_border(self) -> bool:
-        """Whether the outermost cells of the grid carry load."""
+        """True if the outermost cells of the grid carry load."""
         return self.border_load > 0.0
 
 

@@ -56,7 +56,7 @@ class Drive:
 
     @property
     def presses(self) -> bool:
-        """Whether a normal motion is imposed: an approach or a tilt."""
+        """True if a normal motion is imposed: an approach or a tilt."""
         return any(self.motion[k] for k in NORMAL)
 
     def values(self, loads: LoadHistory) -> Array:

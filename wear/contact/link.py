@@ -109,12 +109,12 @@ class StructureLink:
 
     @property
     def coarse(self) -> bool:
-        """Whether the residual of the fit is too large: pressures have an error of that order."""
+        """True if the residual of the fit is too large: pressures have an error of that order."""
         return self.residual > LARGEST_RESIDUAL
 
     @property
     def grainy(self) -> bool:
-        """Whether the residual is mostly graininess of the mesh: the fit follows d itself."""
+        """True if the residual is mostly graininess of the mesh: the fit follows d itself."""
         _, smooth, grain = self.quality
         return bool(smooth <= SMOOTH * grain)
 

@@ -94,7 +94,7 @@ class Estimate:
 
     @property
     def determined(self) -> bool:
-        """Whether the data determine the parameter."""
+        """True if the data determine the parameter."""
         return not self.doubt
 
 

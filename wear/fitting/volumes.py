@@ -118,7 +118,7 @@ class VolumeLaw:
 
     @property
     def uses_amplitude(self) -> bool:
-        """Whether the law depends on the amplitude of the tests."""
+        """True if the law depends on the amplitude of the tests."""
         return self.exponent != 0.0
 
     def volume(self, energy: Array, amplitude: Array | None, values: Mapping[str, float]) -> Array:

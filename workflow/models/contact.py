@@ -163,7 +163,7 @@ class Wear:
 
     @property
     def automatic(self) -> bool:
-        """Whether an error estimate chooses the length of steps."""
+        """True if an error estimate chooses the length of steps."""
         return self.jump == JumpSize() and self.fraction is None
 
     def error_control(self) -> ErrorControl | None:

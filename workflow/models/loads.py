@@ -109,12 +109,12 @@ class LoadSource(load_sources.CycleSource, Protocol):
 
     @property
     def line(self) -> bool:
-        """Whether the contacts are line contacts, all forces per length."""
+        """True if the contacts are line contacts, all forces per length."""
         ...
 
     @property
     def slip_known(self) -> bool:
-        """Whether the loads include slip and dissipated energy; otherwise both are 0."""
+        """True if the loads include slip and dissipated energy; otherwise both are 0."""
         ...
 
     def prepare(self) -> None:

@@ -160,7 +160,7 @@ class OutputFolder:
 
     @property
     def has_leftovers(self) -> bool:
-        """Whether a finished run was interrupted before it had removed all its temporary files."""
+        """True if a finished run was interrupted before it had removed all its temporary files."""
         lock = os.path.lexists(self.root / LOCK)
         return lock or STATE in (self.manifest or {}) or any(True for _ in self._partial())
 
@@ -171,7 +171,7 @@ class OutputFolder:
 
     @property
     def lists_state(self) -> bool:
-        """Whether the manifest names the entries needed to resume; only resumable runs have any."""
+        """True if the manifest names the entries needed to resume; only resumable runs have any."""
         return {self.checkpoint.name, self.jumps.name} <= (self.manifest or {}).keys()
 
     def reserve_log(self) -> Path:

@@ -82,7 +82,7 @@ class Screen:
 
     @property
     def on(self) -> bool:
-        """Whether rows are visible."""
+        """True if rows are visible."""
         return self._on
 
     @contextmanager

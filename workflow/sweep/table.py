@@ -43,7 +43,7 @@ class SweepRow:
 
     @property
     def done(self) -> bool:
-        """Whether the run has finished."""
+        """True if the run has finished."""
         return self.finished.summary is not None
 
     @property

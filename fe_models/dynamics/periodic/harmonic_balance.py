@@ -351,7 +351,7 @@ class HarmonicBalance:
 
     @property
     def is_travelling_wave(self) -> bool:
-        """Whether this is a sector in a wave that travels round its ring."""
+        """True if this is a sector in a wave that travels round its ring."""
         return isinstance(self.receptance, WaveReceptance)
 
     @property

@@ -57,7 +57,7 @@ class HarmonicTransfer:
 
     @property
     def mean(self) -> bool:
-        """Whether the motion has harmonic 0."""
+        """True if the motion has harmonic 0."""
         return self.resolution.harmonics[0] == 0
 
     @cached_property
@@ -109,7 +109,7 @@ class HarmonicTransfer:
 
     @cached_property
     def _few(self) -> bool:
-        """Whether a compiled loop over harmonics, joints and modes beats matrix products."""
+        """True if a compiled loop over harmonics, joints and modes beats matrix products."""
         return len(self.resolution.harmonics) * self.receptance.at_joints.size <= FEW
 
     def mean_response(self, force: Array, unknowns: Array) -> Array:

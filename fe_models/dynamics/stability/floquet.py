@@ -104,7 +104,7 @@ class Stability:
 
     @property
     def resolved(self) -> bool:
-        """Whether the error of the multipliers is known."""
+        """True if the error of the multipliers is known."""
         return bool(np.isfinite(self.error))
 
     @property
@@ -175,7 +175,7 @@ class Floquet:
 
     @property
     def cheap(self) -> bool:
-        """Whether the analysis of a motion takes milliseconds; otherwise it may take seconds."""
+        """True if the analysis of a motion takes milliseconds; otherwise it may take seconds."""
         modes, directions = (
             self._sectors * len(part)
             for part in (self._problem.model.mass, self._problem.model.connection)

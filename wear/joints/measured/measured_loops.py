@@ -153,7 +153,7 @@ class MeasuredLoops:
 
     @property
     def slides(self) -> bool:
-        """Whether the branches of all loops end in sliding."""
+        """True if the branches of all loops end in sliding."""
         return bool((self.sliding > 0.0).all())
 
     @property

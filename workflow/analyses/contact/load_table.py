@@ -31,7 +31,7 @@ class LoadTable:
 
     @property
     def is_motion(self) -> tuple[bool, ...]:
-        """Whether the motion is imposed instead of the force, by degree of freedom."""
+        """True if the motion is imposed instead of the force, by degree of freedom."""
         return tuple(motion in self.columns for motion in MOTIONS)
 
     @property

@@ -135,5 +135,5 @@ class EvolutionSection(Section):
 
     @property
     def is_empty(self) -> bool:
-        """Whether no parameter changes."""
+        """True if no parameter changes."""
         return all(getattr(self, name) is None for name in type(self).model_fields)

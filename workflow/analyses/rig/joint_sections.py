@@ -31,7 +31,7 @@ class Joint(Section):
 
     @property
     def moves_mean(self) -> bool:
-        """Whether a vibration about 0 has a mean, and even harmonics."""
+        """True if a vibration about 0 has a mean, and even harmonics."""
         return False
 
 
@@ -142,7 +142,7 @@ class ElasticJoint(Section):
 
     @property
     def moves_mean(self) -> bool:
-        """Whether a vibration about 0 has a mean, and even harmonics."""
+        """True if a vibration about 0 has a mean, and even harmonics."""
         return False
 
 

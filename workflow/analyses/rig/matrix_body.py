@@ -272,7 +272,7 @@ class MatrixBody(JointedBody, Matrices):
 
     @property
     def small(self) -> bool:
-        """Whether the model is quick to build."""
+        """True if the model is quick to build."""
         return len(self.matrices.read().unknowns) <= SMALL
 
     def _check_points(self) -> None:

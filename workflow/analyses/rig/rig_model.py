@@ -55,7 +55,7 @@ class JointNodes:
 
     @property
     def alike(self) -> bool:
-        """Whether all joints have the same normal."""
+        """True if all joints have the same normal."""
         return bool((self.normals == self.normals[0]).all())
 
 

@@ -82,7 +82,7 @@ class Ageing(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether the joint is aged."""
+        """True if the joint is aged."""
         return self.energy is not None or self.cycles is not None
 
 

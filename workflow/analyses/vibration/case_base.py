@@ -145,12 +145,12 @@ class VibrationCaseBase(Case):
 
     @property
     def contacts(self) -> bool:
-        """Whether joints are contacts, with a normal direction."""
+        """True if joints are contacts, with a normal direction."""
         return False
 
     @property
     def moves_mean(self) -> bool:
-        """Whether joints may move the mean of a vibration: contacts do."""
+        """True if joints may move the mean of a vibration: contacts do."""
         return self.contacts
 
     @property
@@ -182,7 +182,7 @@ class VibrationCaseBase(Case):
 
     @property
     def _shares(self) -> bool:
-        """Whether there is a law for joints without a law of their own."""
+        """True if there is a law for joints without a law of their own."""
         return True
 
     @property

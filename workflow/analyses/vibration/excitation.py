@@ -197,7 +197,7 @@ class VibrationExcitation(Section):
 
     @property
     def moves_by_a_way(self) -> bool:
-        """Whether a ground displacement is given, whose forces change with the frequency."""
+        """True if a ground displacement is given, whose forces change with the frequency."""
         return any(isinstance(motion, GroundDisplacement) for motion in self.base)
 
     def harmonics(self, highest: int) -> set[int]:

@@ -117,7 +117,7 @@ class VibrationModel:
 
     @property
     def undamped(self) -> bool:
-        """Whether only the joints limit a resonance."""
+        """True if only the joints limit a resonance."""
         receptance = self._first
         return not (receptance.damping.any() or receptance.loss.any())
 

@@ -78,7 +78,7 @@ class ContactMoment:
 
     @property
     def bulk(self) -> bool:
-        """Whether all bodies include the stress that a structure carries past the contact."""
+        """True if all bodies include the stress that a structure carries past the contact."""
         return len(self.carried) == len(self.bodies)
 
 
@@ -95,17 +95,17 @@ class InterfaceStress:
 
     @property
     def bulk(self) -> bool:
-        """Whether all moments include the stress that a structure carries past the contact."""
+        """True if all moments include the stress that a structure carries past the contact."""
         return all(moment.bulk for moment in self.moments.values())
 
     @property
     def mapped(self) -> bool:
-        """Whether there are maps of the fretting parameter."""
+        """True if there are maps of the fretting parameter."""
         return all(body.maps for body in self._bodies)
 
     @property
     def cracking(self) -> bool:
-        """Whether the fretting parameter is above 0 anywhere."""
+        """True if the fretting parameter is above 0 anywhere."""
         parameter = self.planes.settings.life.parameter
         name = RUIZ[0] if parameter == "ruiz" else parameter
         return self.mapped and any(body.maps[name].values.any() for body in self._bodies)

@@ -29,7 +29,7 @@ from workflow.analyses.wear.results import write_output
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.analyses.wear.structures.resultants.writing import marched
-from workflow.analyses.wear.translation import check_section, face_contact
+from workflow.analyses.wear.translation import check_section
 from workflow.analyses.wear.warnings import (
     warn_of_contact,
     warn_of_file,
@@ -106,7 +106,7 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
         if isinstance(source, ResultantsSource):
             warn_of_file(source, reporter)
         with reporter.stage("contact set-up"):
-            contacts = _contacts(case, model, source, faces, workers)
+            contacts = _contacts(case, model, source, workers)
         state, first = _march(run, model, source, contacts, unworn, kept)
         ends = _told_once(contacts.ends(state.interfaces), working, len(faces))
     columns = contacts.stages, unworn, first, state.interfaces, ends
@@ -140,16 +140,13 @@ def _told_once(
 
 
 def _contacts(
-    case: WearCase,
-    model: WearModel,
-    source: LoadSource,
-    faces: Sequence[ContactFace],
-    workers: Workers,
+    case: WearCase, model: WearModel, source: LoadSource, workers: Workers
 ) -> FaceContacts:
     """Return the contacts: half-spaces in worker processes or here, or nodes of the structure."""
+    contacts = model.face_contacts(source)
     if _worn_apart(case, source):
-        return ContactProcesses([face_contact(case, face) for face in faces], workers)
-    return model.face_contacts(source)
+        return ContactProcesses(contacts.stages, workers)
+    return contacts
 
 
 def _worn_apart(case: WearCase, source: LoadSource) -> bool:

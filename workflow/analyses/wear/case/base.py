@@ -131,7 +131,7 @@ class WearCase(WithScans, Case):
 
     @property
     def friction_evolves(self) -> bool:
-        """Whether friction of any contact changes as it wears."""
+        """True if friction of any contact changes as it wears."""
         return any(terms.friction.evolution is not None for terms in self.every_terms)
 
     def on_one_grid(self) -> Self:

@@ -46,7 +46,7 @@ class Loops(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether any loops are requested."""
+        """True if any loops are requested."""
         return self.amplitude is not None or self.force is not None
 
     def described(self) -> TangentialLoops | None:

@@ -178,7 +178,7 @@ class Step(Section):
 
     @property
     def automatic(self) -> bool:
-        """Whether an error estimate chooses the size."""
+        """True if an error estimate chooses the size."""
         return all(getattr(self, key) is None for key in SIZES)
 
 
@@ -384,5 +384,5 @@ class ContactStress(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether any stress has to be computed."""
+        """True if any stress has to be computed."""
         return self.section != "none" or self.life.parameter != "none"

@@ -308,7 +308,7 @@ class TwoBodiesWearCase(WearCase):
 
     @property
     def splits(self) -> bool:
-        """Whether increments are split to meet ``contact.accuracy``; rows of a file are not."""
+        """True if increments are split to meet ``contact.accuracy``; rows of a file are not."""
         path = self.load_path
         return self.contact.method == "full" and getattr(path, "file", None) is None
 

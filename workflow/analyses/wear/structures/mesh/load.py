@@ -65,7 +65,7 @@ class MeshLoad(Section):
 
     @property
     def ties(self) -> bool:
-        """Whether the load holds nodes, or ties them to each other."""
+        """True if the load holds nodes, or ties them to each other."""
         return getattr(self, "tie", None) == "rigid"
 
     @property

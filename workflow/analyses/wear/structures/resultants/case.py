@@ -131,7 +131,7 @@ class Resultants(Section):
 
     @property
     def line(self) -> bool:
-        """Whether the contacts are line contacts."""
+        """True if the contacts are line contacts."""
         return self.dimension == 2
 
     def size_of(self, name: str) -> tuple[float, float]:
