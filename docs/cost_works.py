@@ -45,13 +45,13 @@ from sa_solver import (
 )
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.transforms import passes as loops
-from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import structure_loads
 from workflow.kinds import load_case
 from workflow.models.structure import StructureLoads
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 CASES = Path(__file__).parent.parent / "cases"
 TITANIUM, FRICTION = Material(115e3, 0.29), 0.5

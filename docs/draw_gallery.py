@@ -23,7 +23,7 @@ from ruamel.yaml import YAML
 
 from workflow.kinds import analysis_of, load_case
 from workflow.pictures.style import write_figures
-from workflow.shell.results import read_contents
+from workflow.shell.output.results import read_contents
 
 ROOT = Path(__file__).parent.parent
 GALLERY = ROOT / "docs" / "gallery"

@@ -15,7 +15,7 @@ from sa_solver.types import ElasticPair, Grid, Material
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
 from tests.reduced_pads import FRICTION, STROKE, coarse_pads
-from tests.workflow.time_scenes import RIG, run
+from tests.workflow.vibration.time_scenes import RIG, run
 from wear.joints.jenkins import Jenkins
 from workflow.analyses.specimens.run import QUARTER
 from workflow.shell.convergence import richardson

@@ -43,7 +43,7 @@ SCAN = """
 from pathlib import Path
 import numpy as np
 from sa_solver.surfaces.scans import Scan
-from workflow.case.scan_files import read_scan, write_scan
+from workflow.case.files.scan_files import read_scan, write_scan
 heights = 1e-3 * np.random.default_rng(1).normal(size=(12, 9))
 write_scan(Path("scan.x3p"), Scan(heights, (2e-3, 2e-3)))
 print(np.allclose(read_scan("scan.x3p", None, None).heights, heights, atol=1e-8))

@@ -21,7 +21,7 @@ from workflow.commands.group import OneLineGroup
 from workflow.measurements import fit, loops, scar
 
 if TYPE_CHECKING:
-    from workflow.shell.screen import Loudness
+    from workflow.shell.terminal.screen import Loudness
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -48,7 +48,7 @@ def _loud(command: Command) -> Command:
 
 
 def _loudness(level: str | None) -> Loudness:
-    from workflow.shell.screen import Loudness
+    from workflow.shell.terminal.screen import Loudness
 
     return Loudness[level or "NORMAL"]
 
@@ -195,7 +195,7 @@ def chart(
     from workflow.chart import accuracy_of, chart_case
     from workflow.chart.report import show, write_chart
     from workflow.runs.first_look import look_at
-    from workflow.shell.lock import locked
+    from workflow.shell.folders.lock import locked
 
     with _repeatable(out), locked(out) as gone:
         if gone and loudness != "QUIET":
@@ -263,9 +263,9 @@ def check(case: str, overrides: tuple[str, ...], out: Path | None, force: bool) 
     With --out the contact faces of a meshed structure are drawn: where they are, and how far apart.
     """
     from workflow.case.doubts import doubts_of
-    from workflow.case.leaves import taken
+    from workflow.case.text.leaves import taken
     from workflow.kinds import analysis_of, load_case
-    from workflow.shell.measured import check_measured
+    from workflow.shell.output.measured import check_measured
 
     loaded = load_case(case, overrides)
     analysis = analysis_of(loaded)
@@ -446,8 +446,8 @@ for _command in (loops, scar, fit):
 
 def main() -> None:
     """Run the command line; this is the entry point of the command."""
-    from workflow.shell.signals import end_tidily, hear_no_more
-    from workflow.shell.streams import hold_standard_streams, spell_what_streams_lack
+    from workflow.shell.terminal.signals import end_tidily, hear_no_more
+    from workflow.shell.terminal.streams import hold_standard_streams, spell_what_streams_lack
 
     hold_standard_streams()
     spell_what_streams_lack()

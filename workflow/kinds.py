@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from workflow.case import loading
-from workflow.case.json_schema import json_schema as write_schema
 from workflow.case.sections import Case, Section
-from workflow.case.template import short_template
-from workflow.case.template import template as write_template
+from workflow.case.text.json_schema import json_schema as write_schema
+from workflow.case.text.template import short_template
+from workflow.case.text.template import template as write_template
 from workflow.shell.analysis import Analysis
 
 ANALYSES: Mapping[str, str] = {

@@ -82,7 +82,7 @@ def fit(file: Path, out: Path | None, force: bool) -> None:
     from workflow.fit.report import report
     from workflow.fit.running import run_fit, write_fit
     from workflow.fit.schema import load_fit
-    from workflow.shell.screen import Loudness
+    from workflow.shell.terminal.screen import Loudness
 
     fitted = run_fit(load_fit(file), out, force, Loudness.NORMAL)
     for line in report(fitted):

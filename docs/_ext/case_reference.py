@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from workflow.case.explain import KINDS_ARE_NAMED_BY
 from workflow.case.sections import Case, Section, entries_of, entry_of, sections_of
+from workflow.case.text.explain import KINDS_ARE_NAMED_BY
 from workflow.kinds import kinds
 
 if TYPE_CHECKING:

@@ -29,10 +29,10 @@ from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic.march import PeriodicMarch
-from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.kinds import load_case
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 HERE = Path(__file__).parent
 PYHARM = HERE.parents[1] / ".venv" / "pyharm"

@@ -9,8 +9,8 @@ import pytest
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from tests.wear import contacts
-from tests.wear.contacts import BODY, FRICTION, PAIR, STEEL
+from tests.wear.contact import contacts
+from tests.wear.contact.contacts import BODY, FRICTION, PAIR, STEEL
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads
 from wear.contact.interface import InterfaceContact

@@ -20,17 +20,17 @@ from sa_solver.types import Array, Frame, Grid
 from tests.conftest import CASES
 from tests.wheels import sector, shoe
 from tests.workflow.case_leaves import BODY, CELLS, row_in_space
-from tests.workflow.commands import invoke, runs_here
+from tests.workflow.command_line import invoke, runs_here
 from tests.workflow.mesh_scenes import pressed_blocks
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear import run as wear_run
-from workflow.analyses.wear.layout import WearContents
+from workflow.analyses.wear.output.layout import WearContents
 from workflow.kinds import kinds
 from workflow.pictures import drawing
 from workflow.runs import run as running
 from workflow.shell import processes
-from workflow.shell.folder import OutputFolder
-from workflow.shell.results import read_contents
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.output.results import read_contents
 
 SIZE, EDGE, END = (10.0, 60.0), 1.0, 3.0
 EDGE_RADIUS, END_RADIUS = 30.0, 150.0

@@ -5,7 +5,7 @@ import json
 import numpy as np
 from ruamel.yaml import YAML
 
-from tests.workflow.commands import invoke
+from tests.workflow.command_line import invoke
 
 STEEL = {"young": "200 GPa", "poisson": 0.3, "density": "7800 kg/m^3"}
 WEAR = {

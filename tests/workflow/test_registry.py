@@ -19,7 +19,7 @@ import pytest
 
 from fe_models.meshes.structure_mesh import Face
 from sa_solver.types import Array, Frame, LoadHistory
-from tests.workflow.commands import invoke
+from tests.workflow.command_line import invoke
 from workflow import kinds
 from workflow.analyses import wear
 from workflow.analyses.wear import structures
@@ -32,8 +32,8 @@ from workflow.case.sections import Case, Length, Section, Stress, entry
 from workflow.models.loads import ContactFace, UserFace
 from workflow.shell.analysis import Analysis, Run
 from workflow.shell.memory import Memory
+from workflow.shell.output.summary import finish
 from workflow.shell.run_time import RunTime
-from workflow.shell.summary import finish
 
 Force = Annotated[float, Quantity("N", above=0.0, at_most=1e6)]
 

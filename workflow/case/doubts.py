@@ -17,8 +17,8 @@ from pydantic import BaseModel
 
 from sa_solver.types import Array
 from workflow.case.fields import Quantity
-from workflow.case.plain import between, plain, said_in
 from workflow.case.sections import Case, entry_of
+from workflow.case.text.plain import between, plain, said_in
 
 # Aspect ratio of cells above which a grid wastes most of them.
 SQUARE = 5.0

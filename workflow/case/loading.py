@@ -10,10 +10,10 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from workflow.case.explain import Explanation
 from workflow.case.fields import NO_CONTEXT, File, shown
 from workflow.case.sections import Case, Section, words_of
 from workflow.case.source import KeyPath, Source, dotted, read_text
+from workflow.case.text.explain import Explanation
 from workflow.errors import CaseError
 
 AnyCase = TypeVar("AnyCase", bound=Case)

@@ -14,7 +14,7 @@ from typing import Any
 
 from workflow.analyses.contact.case import HEIGHTS
 from workflow.case.sections import Case
-from workflow.case.writing import dump_case
+from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case
 

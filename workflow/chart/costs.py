@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from workflow.case.sections import Case
-from workflow.shell.folder import OutputFolder
-from workflow.shell.store import read_bytes
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.store import read_bytes
 
 # Sections of a case that do not affect the structural stages.
 NOT_STRUCTURAL = {

@@ -13,9 +13,9 @@ from rich.table import Column, Table
 from workflow.chart.frontier import Combination, cheapest
 from workflow.chart.ladder import Judged, Ladder
 from workflow.chart.run import KIND, Chart
-from workflow.shell.folder import OutputFolder
-from workflow.shell.tables import write_table
-from workflow.shell.versions import versions
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.versions import versions
+from workflow.shell.output.tables import write_table
 
 # Width in columns of tables that go to a file.
 FILE_WIDTH = 120

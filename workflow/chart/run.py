@@ -30,12 +30,12 @@ from workflow.kinds import analysis_of, load_case
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
-from workflow.shell.cache import kept_files
-from workflow.shell.folder import OutputFolder
+from workflow.shell.folders.cache import kept_files
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.output.summary import number_at
 from workflow.shell.processes import environment
-from workflow.shell.reporter import Reporter
-from workflow.shell.screen import Loudness
-from workflow.shell.summary import number_at
+from workflow.shell.terminal.reporter import Reporter
+from workflow.shell.terminal.screen import Loudness
 
 CACHE = "FRETSCALE_CACHE"
 ACCURACY = Quantity("1", above=0.0, at_most=1.0)

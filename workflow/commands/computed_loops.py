@@ -9,10 +9,10 @@ import h5py
 
 from wear.joints.measured.loop_record import MeasuredLoopError
 from wear.joints.measured.measured_loops import measure_loops
-from workflow.case.input_files import open_hdf5
+from workflow.case.files.input_files import open_hdf5
 from workflow.errors import UserError
 from workflow.runs.provenance import case_values
-from workflow.shell.folder import OutputFolder
+from workflow.shell.folders.folder import OutputFolder
 
 HEADINGS = ("cycles", "energy [J{per}]", "kt [N/um{per}]", "stuck", "+-", "mu")
 WIDTH = 15

@@ -12,9 +12,9 @@ from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.length_unit import SIZES
 from workflow.case.sections import Length
 from workflow.errors import UserError
-from workflow.shell.folder import OutputFolder
-from workflow.shell.lock import locked
-from workflow.shell.store import replacing
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.lock import locked
+from workflow.shell.folders.store import replacing
 
 FIGURE, PARAVIEW = "assembly.png", "assembly.vtu"
 

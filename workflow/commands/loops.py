@@ -16,12 +16,12 @@ from wear.joints.measured.measured_loops import (
     mean_estimate,
     measure_loops,
 )
-from workflow.analyses.wear.loop_table import write_loop_table
-from workflow.case.loop_file import BASE_UNITS, account, read_loop_file
+from workflow.analyses.wear.output.loop_table import write_loop_table
+from workflow.case.files.loop_file import BASE_UNITS, account, read_loop_file
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
-from workflow.shell.folder import OutputFolder
-from workflow.shell.lock import locked
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.lock import locked
 
 TABLE, FIGURE = "loops.csv", "loops.png"
 # Largest number of cycles that are printed.

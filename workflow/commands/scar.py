@@ -10,14 +10,14 @@ from sa_solver.errors import InputError
 from sa_solver.surfaces.scans import Scan
 from sa_solver.types import Mask
 from wear.scar import Scar, measure_scar
-from workflow.case.input_files import InputFileError
-from workflow.case.plain import plain
-from workflow.case.scan_files import NEAR, UNITS, read_scan
+from workflow.case.files.input_files import InputFileError
+from workflow.case.files.scan_files import NEAR, UNITS, read_scan
+from workflow.case.text.plain import plain
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
-from workflow.shell.folder import OutputFolder
-from workflow.shell.lock import locked
-from workflow.shell.store import replacing, write_text
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.lock import locked
+from workflow.shell.folders.store import replacing, write_text
 
 TABLE, FIELDS, FIGURE = "scar.csv", "scar.npz", "scar.png"
 TO_MICRONS, PER_MICRON = 1e3, 1e9

@@ -10,15 +10,15 @@ import numpy as np
 
 from sa_solver.surfaces.scans import Scan
 from sa_solver.types import Array, Grid
-from workflow.case.input_files import open_hdf5
-from workflow.case.scan_files import write_scan
+from workflow.case.files.input_files import open_hdf5
+from workflow.case.files.scan_files import write_scan
 from workflow.case.sections import Case
 from workflow.errors import UserError
 from workflow.kinds import load_case
 from workflow.runs.provenance import case_values
-from workflow.shell.folder import OutputFolder
-from workflow.shell.results import grid_of
-from workflow.shell.store import replacing
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.store import replacing
+from workflow.shell.output.results import grid_of
 
 
 def write_surface(

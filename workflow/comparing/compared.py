@@ -9,15 +9,15 @@ from os.path import commonpath
 from pathlib import Path
 from typing import Any
 
-from workflow.case.leaves import leaves_of
-from workflow.case.readable import suited_unit
+from workflow.case.text.leaves import leaves_of
+from workflow.case.text.readable import suited_unit
 from workflow.errors import UserError
 from workflow.kinds import analysis_of
 from workflow.report.told import ToldRun
 from workflow.report.writing import told_run
 from workflow.shell.analysis import Analysis
-from workflow.shell.quantities import SummaryQuantity
-from workflow.shell.summary import required_number
+from workflow.shell.output.quantities import SummaryQuantity
+from workflow.shell.output.summary import required_number
 
 # Entries of a case that no result depends on.
 NO_MATTER = "title", "output", "assumed", "measured", "expect", "reported"

@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.case.readable import suited
-from workflow.case.typeset import minus
+from workflow.case.text.readable import suited
+from workflow.case.text.typeset import minus
 from workflow.comparing.compared import ComparedRuns
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
-from workflow.shell.curves import Curve, curves_in
-from workflow.shell.folder import OutputFolder
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.output.curves import Curve, curves_in
 
 INCHES = 7.0, 4.6
 COLOURS = BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK

@@ -14,9 +14,9 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Column, Table
 
-from workflow.case.readable import percent, readable
-from workflow.case.typeset import given
-from workflow.case.typeset import number as printed
+from workflow.case.text.readable import percent, readable
+from workflow.case.text.typeset import given
+from workflow.case.text.typeset import number as printed
 from workflow.comparing.compared import NOTHING, ComparedQuantity, ComparedRuns
 from workflow.report.numbers import value_of
 from workflow.report.page import (
@@ -30,7 +30,7 @@ from workflow.report.page import (
     section,
     table,
 )
-from workflow.shell.tables import write_table
+from workflow.shell.output.tables import write_table
 
 # Mark of a difference that exceeds both estimated errors.
 BEYOND = "!"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from workflow.comparing.compared import ComparedRuns
 from workflow.comparing.showing import comparison_page, write_csv
-from workflow.shell.folder import OutputFolder
-from workflow.shell.lock import locked
-from workflow.shell.store import write_text
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.lock import locked
+from workflow.shell.folders.store import write_text
 
 TABLE, PAGE, FIGURES = "compare.csv", "compare.html", "curves"
 

@@ -12,7 +12,7 @@ from wear.fitting import FitError, LoopData, fit, loop_data, loop_problem
 from wear.fitting.loops import MOST_LOOPS
 from wear.joints.measured.loop_record import MeasuredLoopError
 from wear.joints.measured.measured_loops import ALIKE, MeasuredLoops, measure_loops
-from workflow.case.loop_file import account, read_loop_file
+from workflow.case.files.loop_file import account, read_loop_file
 from workflow.errors import UserError
 from workflow.fit.fitting import DISPLACEMENT, JOINT_UNITS, Fitted, FittedSeries, solved
 from workflow.fit.measured import MeasuredColumn

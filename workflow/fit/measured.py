@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array, Indices, Mask
-from workflow.analyses.wear.loop_table import SLIDES
+from workflow.analyses.wear.output.loop_table import SLIDES
 from workflow.case.fields import Quantity, shown
-from workflow.case.input_files import InputFileError
+from workflow.case.files.input_files import InputFileError
+from workflow.case.files.table_file import TableFile, read_table_file
 from workflow.case.sections import Section
-from workflow.case.table_file import TableFile, read_table_file
 from workflow.fit.measurement import Measurement
 
 ENERGY, PLACE = "energy", "x"

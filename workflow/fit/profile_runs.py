@@ -12,16 +12,16 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.wear.case.worn_bodies import WornByEnergy, WornByEnergyAmplitude
-from workflow.analyses.wear.measures import PLAIN, interfaces, middle_profiles
+from workflow.analyses.wear.output.measures import PLAIN, interfaces, middle_profiles
+from workflow.case.text.writing import scalar
 from workflow.case.units import to_base
-from workflow.case.writing import scalar
 from workflow.errors import CaseError, MethodFailed, UserError
 from workflow.fit.profile_schema import ProfileFit, ProfileMeasurement
 from workflow.fit.schema import FitInput
 from workflow.kinds import analysis_of
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
-from workflow.shell.reporter import Reporter, telling
+from workflow.shell.terminal.reporter import Reporter, telling
 
 Pair = tuple[float, float]
 """Wear coefficients of body 1 and body 2 [1/MPa]."""

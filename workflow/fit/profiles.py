@@ -19,18 +19,18 @@ import numpy as np
 from sa_solver.types import Array
 from wear.fitting import ComputedScars, Fit, FitError, ScarData, fit, scar_problem
 from wear.fitting.scars import HEIGHT, SHIFT, THRESHOLD, ScarFit
-from workflow.case.plain import counted
-from workflow.case.writing import scalar
+from workflow.case.text.plain import counted
+from workflow.case.text.writing import scalar
 from workflow.errors import CaseError, UserError
 from workflow.fit.fitting import UNITS, FitAxis, Fitted, FittedSeries, solved
 from workflow.fit.measured import PLACE, MeasuredColumn, read_columns
 from workflow.fit.profile_runs import Pair, RunScar, TestRuns, rounded
 from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.schema import FitInput
-from workflow.shell.folder import OutputFolder
-from workflow.shell.lock import locked
-from workflow.shell.reporter import Reporter
-from workflow.shell.screen import Loudness
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.lock import locked
+from workflow.shell.terminal.reporter import Reporter
+from workflow.shell.terminal.screen import Loudness
 
 BOTH = "both"
 BODIES = {"depth": BOTH, "depth_1": "body_1", "depth_2": "body_2"}

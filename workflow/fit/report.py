@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from workflow.case.plain import counted
+from workflow.case.text.plain import counted
 from workflow.fit.fitting import Fitted, Parameter
 from workflow.fit.section import entries_of, told
-from workflow.shell.tables import heading
-from workflow.shell.versions import versions
+from workflow.shell.folders.versions import versions
+from workflow.shell.output.tables import heading
 
 # Smallest correlation that is printed.
 CLOSE = 0.9

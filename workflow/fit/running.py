@@ -11,11 +11,11 @@ from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.report import data_columns, parameter_columns, summary
 from workflow.fit.schema import FitInput, JointFit, LoopFitSection
 from workflow.fit.section import section_of
-from workflow.shell.folder import OutputFolder
-from workflow.shell.lock import locked
-from workflow.shell.screen import Loudness
-from workflow.shell.store import write_text
-from workflow.shell.tables import write_table
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.lock import locked
+from workflow.shell.folders.store import write_text
+from workflow.shell.output.tables import write_table
+from workflow.shell.terminal.screen import Loudness
 
 FILES = {
     "fit.yaml": "the fit as asked for",

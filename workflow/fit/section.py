@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from workflow.case.sections import Section
-from workflow.case.writing import EntryRow, render
+from workflow.case.text.writing import EntryRow, render
 from workflow.fit.fitting import JOINT_UNITS, UNITS, Fitted, Parameter
 from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.schema import FREE, JointFit, LoopFitSection, WearFit

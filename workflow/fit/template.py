@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from workflow.case.sections import Section
-from workflow.case.template import EDITORS, template
+from workflow.case.text.template import EDITORS, template
 from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.schema import JointFit, LoopFitSection, WearFit
 

@@ -10,12 +10,12 @@ from typing import Any
 
 from workflow import kinds
 from workflow.case.doubts import doubts_of
-from workflow.case.leaves import taken
 from workflow.case.sections import Case
 from workflow.case.source import IN_PYTHON, dotted
-from workflow.case.writing import dump_case
+from workflow.case.text.leaves import taken
+from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError
-from workflow.shell.measured import check_measured
+from workflow.shell.output.measured import check_measured
 
 AnyCase = str | os.PathLike[str] | Mapping[str, Any] | Case
 """Case: the path of its file, its entries as nested dictionaries, or a loaded case."""

@@ -16,7 +16,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
 from workflow.errors import UserError
-from workflow.shell.results import COORDINATES
+from workflow.shell.output.results import COORDINATES
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,7 +12,7 @@ from typing import TextIO
 from wear.coupled import CoupledState, Observer, Stage
 from workflow.analyses.wear.checkpoint import restored_state, stored_state
 from workflow.errors import UserError
-from workflow.shell.store import DamagedFile, read_arrays, write_arrays
+from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
 
 
 class Progress(Observer):

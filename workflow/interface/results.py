@@ -7,15 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from workflow.case.plain import counted
-from workflow.case.readable import percent, readable
 from workflow.case.sections import Case
+from workflow.case.text.plain import counted
+from workflow.case.text.readable import percent, readable
 from workflow.interface.datasets import Group, ResultsFile
 from workflow.kinds import analysis_of, load_case
 from workflow.report.writing import write_report
 from workflow.runs.provenance import case_values
-from workflow.shell.folder import DIGESTS, OutputFolder
-from workflow.shell.summary import required_number
+from workflow.shell.folders.folder import DIGESTS, OutputFolder
+from workflow.shell.output.summary import required_number
 
 
 def open(folder: str | os.PathLike[str]) -> Results:  # noqa: A001 - fretscale.open

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from workflow.case.sections import Case
-from workflow.case.writing import dump_case
+from workflow.case.text.writing import dump_case
 from workflow.interface.cases import AnyCase, load_case
 from workflow.interface.results import Results
 from workflow.interface.results import open as open_results
 from workflow.kinds import kind_of
 from workflow.runs.run import bring_to_end, kept_in, run_case
-from workflow.shell.screen import Loudness
-from workflow.shell.streams import hold_standard_streams
+from workflow.shell.terminal.screen import Loudness
+from workflow.shell.terminal.streams import hold_standard_streams
 
 # Parent folder of runs for which no folder is given.
 OUT = Path("out")

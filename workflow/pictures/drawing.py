@@ -24,8 +24,8 @@ import h5py
 from sa_solver.types import Progress, Tally, unseen
 from workflow.case.sections import Output
 from workflow.shell.analysis import Pictures, Share
-from workflow.shell.folder import OutputFolder
-from workflow.shell.isolation import Isolation
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.isolation import Isolation
 from workflow.shell.processes import Task, WorkerProcess, attempt, share_out
 
 

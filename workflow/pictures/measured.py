@@ -14,14 +14,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sa_solver.types import Array
-from workflow.case.readable import everyday_unit, suited
 from workflow.case.sections import Measured
+from workflow.case.text.readable import everyday_unit, suited
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.pictures.style import AMBER, BLACK, BLUE, ORANGE
 from workflow.shell.analysis import Pictures
-from workflow.shell.measured import MeasuredCurve, beside
-from workflow.shell.quantities import CurvesOf
+from workflow.shell.output.measured import MeasuredCurve, beside
+from workflow.shell.output.quantities import CurvesOf
 
 # Name of the figure with all measured points.
 MEASURED = "measured"

@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from workflow.case.typeset import typeset
+from workflow.case.text.typeset import typeset
 from workflow.pictures.fitting import FittedLayout
 from workflow.pictures.style import COLOUR_MAP, LAST_SHADE
 

@@ -17,8 +17,8 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from workflow.case.typeset import minus, typeset
-from workflow.shell.store import replacing
+from workflow.case.text.typeset import minus, typeset
+from workflow.shell.folders.store import replacing
 
 DOTS_PER_INCH = 100
 # Artists with more vertices are rasterised in vector graphics, at this resolution.

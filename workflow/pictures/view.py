@@ -8,7 +8,7 @@ from importlib import resources
 from pathlib import Path
 from pprint import pformat
 
-from workflow.shell.store import write_text
+from workflow.shell.folders.store import write_text
 
 FIRST = "view.py"
 PLACEHOLDER = "SCENE: dict[str, Any] = {}\n"

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Frame, Grid, Indices, Mask
-from workflow.shell.store import replacing
+from workflow.shell.folders.store import replacing
 
 if TYPE_CHECKING:
     import pyvista

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from workflow.case.readable import percent, readable
-from workflow.case.typeset import MINUS, number, unparted
+from workflow.case.text.readable import percent, readable
+from workflow.case.text.typeset import MINUS, number, unparted
 from workflow.report.page import Html, element, lines, note, table, unbroken
-from workflow.shell.quantities import SummaryQuantity
-from workflow.shell.summary import number_at, required_number
+from workflow.shell.output.quantities import SummaryQuantity
+from workflow.shell.output.summary import number_at, required_number
 
 # Largest number of groups side by side, so that a table fits on a sheet of paper.
 COLUMNS = 4

@@ -8,9 +8,9 @@ from itertools import groupby
 from pathlib import PurePath
 from typing import Any
 
-from workflow.case.leaves import GIVEN, Leaf, in_words, leaves_of
-from workflow.case.readable import everyday_unit, percent, pretty, readable
-from workflow.case.typeset import exact_percent, given, number, typeset
+from workflow.case.text.leaves import GIVEN, Leaf, in_words, leaves_of
+from workflow.case.text.readable import everyday_unit, percent, pretty, readable
+from workflow.case.text.typeset import exact_percent, given, number, typeset
 from workflow.kinds import analysis_of
 from workflow.report.numbers import error_budget, results
 from workflow.report.page import (
@@ -30,9 +30,9 @@ from workflow.report.page import (
     unbroken,
 )
 from workflow.report.told import ToldRun
-from workflow.shell.expectations import Verdict, verdicts
-from workflow.shell.quantities import SummaryQuantity
-from workflow.shell.summary import QuantityError, counted_from_first
+from workflow.shell.output.expectations import Verdict, verdicts
+from workflow.shell.output.quantities import SummaryQuantity
+from workflow.shell.output.summary import QuantityError, counted_from_first
 
 # Sections of a case that do not affect the results, and those that most readers look for.
 APART = "title", "analysis", "output", "assumed", "measured", "expect", "reported"

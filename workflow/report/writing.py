@@ -14,11 +14,11 @@ from workflow.pictures.drawing import vector_figures
 from workflow.report.run_page import run_page
 from workflow.report.told import ToldRun
 from workflow.shell.analysis import Analysis, Pictures
-from workflow.shell.folder import DIGESTS, OutputFolder
-from workflow.shell.lock import locked
-from workflow.shell.quantities import CurvesOf
-from workflow.shell.results import read_contents
-from workflow.shell.store import file_digest, read_bytes, write_text
+from workflow.shell.folders.folder import DIGESTS, OutputFolder
+from workflow.shell.folders.lock import locked
+from workflow.shell.folders.store import file_digest, read_bytes, write_text
+from workflow.shell.output.quantities import CurvesOf
+from workflow.shell.output.results import read_contents
 
 
 def pictures_of(analysis: Analysis[Any], case: Case) -> Callable[[], Pictures] | None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from workflow.case.sections import Case
-from workflow.case.writing import dump_case
+from workflow.case.text.writing import dump_case
 from workflow.errors import MethodFailed, UserError, one_line
 from workflow.runs.job import Job, run_job
 from workflow.shell.forecast import in_words

@@ -24,7 +24,7 @@ from workflow.case.sections import Case
 from workflow.errors import MethodFailed, UserError, one_line
 from workflow.kinds import load_case
 from workflow.runs.run import bring_to_end
-from workflow.shell.folder import OutputFolder
+from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.processes import THREAD_SETTINGS
 
 # Seconds between two checks of whether a run is still wanted.
@@ -100,7 +100,8 @@ def run_job(
     """Compute a job in a new process; return the error in one line, or "" if there is none.
 
     The process is ended if ``unwanted`` returns true. It has a separate process group, so that only
-    the waiting process receives Ctrl-C. For ``take_over`` see :func:`workflow.shell.lock.locked`.
+    the waiting process receives Ctrl-C. For ``take_over`` see
+    :func:`workflow.shell.folders.lock.locked`.
     """
     arguments = asdict(job) | {"case": str(job.case.absolute()), "out": str(out.absolute())}
     arguments["take_over"] = take_over

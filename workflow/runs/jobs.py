@@ -16,7 +16,7 @@ from workflow.errors import Ending, one_line
 from workflow.runs.cluster import run_on_cluster
 from workflow.runs.job import Finished, Job, finished, run_job
 from workflow.runs.run import kept_in
-from workflow.shell.folder import OutputFolder
+from workflow.shell.folders.folder import OutputFolder
 
 
 def run_jobs(

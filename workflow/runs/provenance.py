@@ -9,8 +9,8 @@ from workflow.case.sections import Case, files_of
 from workflow.case.source import Source, read_text
 from workflow.errors import CaseError
 from workflow.kinds import load_case
-from workflow.shell.folder import OutputFolder
-from workflow.shell.store import file_digest
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.store import file_digest
 
 # Entries that do not affect the results: pictures may be switched off before a run is resumed.
 FREE = {"title", "output", "assumed", "measured", "expect"}

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from workflow.case.changing import changed
 from workflow.case.doubts import doubts_of
 from workflow.case.sections import Case
-from workflow.case.writing import dump_case
+from workflow.case.text.writing import dump_case
 from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import load_what_draws, write_pictures
@@ -19,17 +19,17 @@ from workflow.report.told import ToldRun
 from workflow.report.writing import pictures_of, write_page
 from workflow.runs.first_look import first_look
 from workflow.runs.provenance import case_values, provenance_of
-from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Pictures, Run, Share, Summary
-from workflow.shell.checkpoint import StoredState
-from workflow.shell.folder import ASIDE, MANIFEST, REPORT, OutputFolder
-from workflow.shell.lock import locked
-from workflow.shell.measured import check_measured, tell_measured
+from workflow.shell.folders import checkpoint
+from workflow.shell.folders.checkpoint import StoredState
+from workflow.shell.folders.folder import ASIDE, MANIFEST, REPORT, OutputFolder
+from workflow.shell.folders.lock import locked
+from workflow.shell.folders.store import read_bytes
+from workflow.shell.output.measured import check_measured, tell_measured
 from workflow.shell.processes import WorkerProcess
-from workflow.shell.reporter import FORECAST, SHORT_RUN, TERMINAL, Reporter, telling
 from workflow.shell.run_time import RunTime
-from workflow.shell.screen import Loudness, Screen
-from workflow.shell.store import read_bytes
+from workflow.shell.terminal.reporter import FORECAST, SHORT_RUN, TERMINAL, Reporter, telling
+from workflow.shell.terminal.screen import Loudness, Screen
 
 # Seconds after which an interrupted process, and the process that started it, have surely ended.
 PATIENCE = 60.0
@@ -73,7 +73,7 @@ def bring_to_end(
 
     A finished run of the same case is reused, an unfinished one is resumed from its last saved
     state if possible, and other files of earlier runs are replaced. For ``take_over`` see
-    :func:`workflow.shell.lock.locked`. Raises FretscaleError.
+    :func:`workflow.shell.folders.lock.locked`. Raises FretscaleError.
     """
     with _working(case, root, PATIENCE, take_over) as gone:
         OutputFolder(root).refuse_foreign()
@@ -133,7 +133,7 @@ def _state(folder: OutputFolder, case: Case) -> StoredState | None:
 def _working(
     case: Case, out: Path, patience: float = 0.0, take_over: bool = False
 ) -> Iterator[str]:
-    """Hold the folder of a run (see :func:`workflow.shell.lock.locked`).
+    """Hold the folder of a run (see :func:`workflow.shell.folders.lock.locked`).
 
     Raises NotWritten if the disk is full, and KeyboardInterrupt if the run is stopped; their
     messages say how to resume.

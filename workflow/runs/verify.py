@@ -11,11 +11,11 @@ from rich.table import Column, Table
 from workflow.errors import UserError
 from workflow.kinds import load_case
 from workflow.runs.run import run_case
-from workflow.shell.expectations import verdicts
-from workflow.shell.folder import OutputFolder
-from workflow.shell.screen import Loudness
-from workflow.shell.screen import console as terminal
-from workflow.shell.summary import QuantityError
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.output.expectations import verdicts
+from workflow.shell.output.summary import QuantityError
+from workflow.shell.terminal.screen import Loudness
+from workflow.shell.terminal.screen import console as terminal
 
 COLUMNS = "expected", "computed", "unit", "error", "verdict", "kind", "source"
 # Width of the table in columns of text when it is written to a file.

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     import h5py
     from matplotlib.figure import Figure
 
-    from workflow.shell.checkpoint import StoredState
-    from workflow.shell.folder import OutputFolder
-    from workflow.shell.quantities import CurvesOf, SummaryQuantity
-    from workflow.shell.reporter import Reporter
+    from workflow.shell.folders.checkpoint import StoredState
+    from workflow.shell.folders.folder import OutputFolder
+    from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+    from workflow.shell.terminal.reporter import Reporter
 
 AnyCase = TypeVar("AnyCase", bound=Case)
 Summary = Mapping[str, Any]
@@ -166,8 +166,8 @@ class Analysis(Generic[AnyCase]):
         Output that a second process helps to draw; figures are excluded if drawing them takes less
         than the half second in which that process would load the plotting library.
     resumable
-        Whether a run writes a checkpoint (:mod:`workflow.shell.checkpoint`), of its steps
-        (:mod:`workflow.shell.steps`) or of a state that the analysis defines.
+        Whether a run writes a checkpoint (:mod:`workflow.shell.folders.checkpoint`), of its steps
+        (:mod:`workflow.shell.folders.steps`) or of a state that the analysis defines.
     choose
         Returns the case with the settings that it leaves open, and a record of the reasons.
     comparison

@@ -9,7 +9,7 @@ from typing import Any
 from sa_solver.surfaces.resolution import cells_across, fewest_across, is_point, peak_error
 from sa_solver.types import Array, Grid
 from workflow.errors import UserError
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 # Largest number of cells of a contact grid along a direction.
 MOST_CELLS = 4096

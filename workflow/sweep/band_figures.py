@@ -15,12 +15,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.case.readable import suited
+from workflow.case.text.readable import suited
 from workflow.pictures.panels import legend_below, new_figure, panel_grid
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.shell.analysis import Analysis
-from workflow.shell.curves import Curve, curves_in
-from workflow.shell.folder import OutputFolder
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.output.curves import Curve, curves_in
 from workflow.sweep.bands import FEWEST, Piece, curve_band, quantiles
 from workflow.sweep.first_order import sides
 from workflow.sweep.table import SweepRow

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.case.writing import scalar
+from workflow.case.text.writing import scalar
 from workflow.errors import CaseError
 from workflow.runs.job import Job
 from workflow.sweep.first_order import positions

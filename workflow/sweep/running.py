@@ -16,18 +16,18 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.case.plain import counted
+from workflow.case.text.plain import counted
 from workflow.errors import CaseError, UserError
 from workflow.kinds import analysis_of
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
-from workflow.shell.folder import OutputFolder
-from workflow.shell.lock import locked
-from workflow.shell.reporter import Reporter, telling
-from workflow.shell.screen import Loudness
-from workflow.shell.store import write_text
-from workflow.shell.versions import versions
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.lock import locked
+from workflow.shell.folders.store import write_text
+from workflow.shell.folders.versions import versions
+from workflow.shell.terminal.reporter import Reporter, telling
+from workflow.shell.terminal.screen import Loudness
 from workflow.sweep.bands import FEWEST, band_of
 from workflow.sweep.design import SweepRun, runs_of
 from workflow.sweep.first_order import LINEAR, first_order

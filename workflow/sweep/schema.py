@@ -14,7 +14,7 @@ from workflow.case.fields import AnyValue, Entry, File, Whole, is_finite, shown
 from workflow.case.loading import check_command, validated
 from workflow.case.sections import Section, Title, disagreement, entry, one_of
 from workflow.case.source import Source, read_text
-from workflow.case.writing import scalar
+from workflow.case.text.writing import scalar
 from workflow.errors import CaseError, UserError
 from workflow.sweep.fitted import FittedSample, read_fit
 

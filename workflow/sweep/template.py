@@ -8,8 +8,8 @@ from typing import Any
 from pydantic_core import PydanticUndefined
 
 from workflow.case.sections import Section, entries_of
-from workflow.case.template import EDITORS
-from workflow.case.writing import EntryRow, render
+from workflow.case.text.template import EDITORS
+from workflow.case.text.writing import EntryRow, render
 from workflow.sweep.schema import LogNormal, Normal, Range, SweepFile, Uniform
 
 SWEEP = "sweep"

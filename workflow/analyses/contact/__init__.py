@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.contact.case import BodiesCase, ContactCase, LineContactCase
 from workflow.analyses.contact.memory import memory
-from workflow.analyses.contact.quantities import CURVES, main_results
+from workflow.analyses.contact.output.quantities import CURVES, main_results
 from workflow.analyses.contact.run_time import run_time
 from workflow.shell.analysis import Analysis, ChartComparison, Pictures, Run, Summary, expected
 
@@ -37,15 +37,15 @@ def _quantities(case: BodiesCase, summary: Summary) -> list[str]:
 
 
 def _pictures() -> Pictures:
-    from workflow.analyses.contact.datasets import ContactContents
-    from workflow.analyses.contact.paraview import write_contact
+    from workflow.analyses.contact.output.datasets import ContactContents
+    from workflow.analyses.contact.output.paraview import write_contact
 
     return Pictures(_figures_of, write_contact, contents=ContactContents)
 
 
 def _figures_of(contents: Any) -> Mapping[str, Callable[[h5py.File], Figure]]:
     # Imported here, as plotting takes half a second to load.
-    from workflow.analyses.contact.figures import figures_of
+    from workflow.analyses.contact.output.figures import figures_of
 
     return figures_of(contents)
 

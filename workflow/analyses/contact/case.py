@@ -21,9 +21,8 @@ from workflow.analyses.contact.load_table import PRESSING, LoadTable
 from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.case.doubts import heights, hertz, uneven_cells
 from workflow.case.fields import File, Quantity
-from workflow.case.input_files import InputFileError, read_heights
+from workflow.case.files.input_files import InputFileError, read_heights
 from workflow.case.loading import word_at
-from workflow.case.plain import of_bodies, plain, shape_in_words
 from workflow.case.sections import (
     Case,
     ElasticSection,
@@ -40,6 +39,7 @@ from workflow.case.sections import (
     entry,
 )
 from workflow.case.source import Source
+from workflow.case.text.plain import of_bodies, plain, shape_in_words
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual contact.
 Poisson = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]

@@ -9,8 +9,8 @@ import numpy as np
 from sa_solver.types import Array
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.case.doubts import pressed
-from workflow.case.plain import plain
 from workflow.case.sections import ElasticSection
+from workflow.case.text.plain import plain
 
 # Shear below this share of the friction limit is hardly intended.
 HARDLY = 1e-3

@@ -10,8 +10,8 @@ from pydantic import model_validator
 
 from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
 from workflow.case.fields import File, Quantity, Whole
-from workflow.case.input_files import InputFileError
-from workflow.case.plain import between, plain
+from workflow.case.files.input_files import InputFileError
+from workflow.case.files.table_file import read_columns
 from workflow.case.sections import (
     Section,
     disagreement,
@@ -20,7 +20,7 @@ from workflow.case.sections import (
     quantities_of,
     sections_of,
 )
-from workflow.case.table_file import read_columns
+from workflow.case.text.plain import between, plain
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual contact.
 NormalForce = Annotated[float, Quantity("N", at_least=0.0, at_most=1e9, range_text="0 to 1e6 kN")]

@@ -9,7 +9,7 @@ from sa_solver.cycles.history import ContactLoadPath, History, HistoryError, mar
 from sa_solver.errors import ContactProblemError
 from workflow.analyses.contact.bodies import bodies_of, bulk_strain, half_space_of
 from workflow.analyses.contact.case import BodiesCase, surface_doubts
-from workflow.analyses.contact.results import (
+from workflow.analyses.contact.output.results import (
     ContactOutcome,
     ContactRun,
     write_contact_output,
@@ -17,8 +17,8 @@ from workflow.analyses.contact.results import (
 )
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.few_cells import check_cells
-from workflow.shell.folder import OutputFolder
-from workflow.shell.reporter import Reporter
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.terminal.reporter import Reporter
 
 
 def run_contact(run: ContactRun) -> None:

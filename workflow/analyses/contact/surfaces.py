@@ -22,10 +22,10 @@ from sa_solver.surfaces.scans import (
 )
 from sa_solver.types import Array, Grid
 from workflow.case.fields import File, Quantity, Word, split_dataset
-from workflow.case.input_files import InputFileError
-from workflow.case.plain import plain, shares
-from workflow.case.scan_files import ENDINGS, NEAR, UNITS, read_scan
+from workflow.case.files.input_files import InputFileError
+from workflow.case.files.scan_files import ENDINGS, NEAR, UNITS, read_scan
 from workflow.case.sections import Length, Section, disagreement, entry, one_of
+from workflow.case.text.plain import plain, shares
 
 Shift = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4, range_text="-10 to 10 m")]
 Angle = Annotated[float, Quantity("rad", at_least=-6.4, at_most=6.4, range_text="-360 to 360 deg")]

@@ -10,15 +10,15 @@ import numpy as np
 from fe_models.dynamics.damping import damped
 from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from workflow.analyses.rig.bodies.friction_rig import friction_rig_model
+from workflow.analyses.rig.bodies.reduced_rig import known_rig_model, reduced_rig_model
+from workflow.analyses.rig.bodies.ring import RingOfSectors
 from workflow.analyses.rig.damping import Damping
-from workflow.analyses.rig.friction_rig import friction_rig_model
 from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
 from workflow.analyses.rig.place_names import PlaceNames, in_a_row
-from workflow.analyses.rig.reduced_rig import known_rig_model, reduced_rig_model
 from workflow.analyses.rig.rig_model import JointEntry, RigModel
-from workflow.analyses.rig.ring import RingOfSectors
 from workflow.analyses.rig.structure import FrictionRig, JointedBody, RowOfMasses, joints_of
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 
 def rig_model(

@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 
 from workflow.analyses.rig.places import NAMED, Against, Direction
 from workflow.case.fields import OrAlone, Quantity
-from workflow.case.plain import counted, shares
 from workflow.case.sections import Section, Title, disagreement, entry
+from workflow.case.text.plain import counted, shares
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual rig.
 DampingRatio = Annotated[float, Quantity("1", at_least=0.0, below=1.0)]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.analyses.rig.matrix_body import MatrixBody
+from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import FrictionRig, RowOfMasses, joints_of
 from workflow.case.sections import Section
 

@@ -8,9 +8,9 @@ from pydantic import Field, model_validator
 
 from sa_solver.types import Array
 from workflow.case.fields import File, Quantity, Whole
-from workflow.case.input_files import InputFileError
+from workflow.case.files.input_files import InputFileError
+from workflow.case.files.table_file import read_table_file
 from workflow.case.sections import Length, Section, disagreement, entry
-from workflow.case.table_file import read_table_file
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual rig.
 Frequency = Annotated[float, Quantity("Hz", above=0.0, at_most=1e7)]

@@ -112,7 +112,7 @@ class EvolutionSection(Section):
         if self.file is None or not self.file.endswith(".csv"):
             return self
         # Imported here to avoid a cycle: that module reads units, which belong to this package.
-        from workflow.analyses.wear.loop_table import read_loop_table
+        from workflow.analyses.wear.output.loop_table import read_loop_table
 
         try:
             table = read_loop_table(Path(self.file))

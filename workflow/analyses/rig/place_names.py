@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from fe_models.dynamics.rig import Link
+from workflow.analyses.rig.bodies.point_kinds import known, matching
 from workflow.analyses.rig.places import Against, Moved
-from workflow.analyses.rig.point_kinds import known, matching
 from workflow.errors import EntryError
 
 

@@ -20,10 +20,10 @@ from workflow.analyses.rig.joint_sections import (
 from workflow.analyses.rig.places import Against, Direction, KeptPoints, Moved
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.case.fields import Quantity, Whole, shown
-from workflow.case.input_files import InputFileError, open_hdf5
+from workflow.case.files.input_files import InputFileError, open_hdf5
 from workflow.case.loading import YAML, CaseFile, outline_of
-from workflow.case.plain import entries
 from workflow.case.sections import Length, Section, Title, disagreement, entry
+from workflow.case.text.plain import entries
 
 if TYPE_CHECKING:
     from fe_models.joints.reduction import ReducedModel

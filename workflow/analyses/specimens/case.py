@@ -25,7 +25,6 @@ from workflow.analyses.wear.case.sections import (
 )
 from workflow.analyses.wear.case.worn_bodies import BodyWear, WornByArchard, wearing
 from workflow.case.fields import Formats, Quantity, Whole
-from workflow.case.plain import of_bodies, plain, shares, times
 from workflow.case.sections import (
     Case,
     Friction,
@@ -40,6 +39,7 @@ from workflow.case.sections import (
     entry,
     one_of,
 )
+from workflow.case.text.plain import of_bodies, plain, shares, times
 
 if TYPE_CHECKING:
     from fe_models.geometry.specimens import Specimen

@@ -22,7 +22,7 @@ from workflow.pictures.panels import (
 )
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, GREEN, ORANGE, PURPLE
-from workflow.shell.results import grid_of
+from workflow.shell.output.results import grid_of
 
 # Most normal forces that get a panel or colour of their own.
 MOST_LOADS = 4

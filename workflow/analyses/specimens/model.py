@@ -15,7 +15,7 @@ from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.specimens import STEPS, pad_stiffness, reduced_specimens, specimen_matrices
 from sa_solver.types import Array, Grid, Progress, Tally, unseen
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.shell.cache import content_key, load_arrays, save_arrays
+from workflow.shell.folders.cache import content_key, load_arrays, save_arrays
 
 # Rigid motions of a free body, and number of natural frequencies above them to compare.
 RIGID_MOTIONS, FREQUENCIES = 6, 6

@@ -15,7 +15,7 @@ import numpy as np
 
 from workflow.pictures.view import FIRST, PictureScene, Shown, View, write_view
 from workflow.pictures.vtk import CYCLES, Fields, Step, attach, write_series
-from workflow.shell.results import frame_of
+from workflow.shell.output.results import frame_of
 
 FIELDS = {
     "pressure": "pressure",

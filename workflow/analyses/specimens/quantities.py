@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from functools import partial
 
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.analyses.wear.layout import MOMENTS
+from workflow.analyses.wear.output.layout import MOMENTS
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import CurvesOf, SummaryQuantity
-from workflow.shell.summary import estimate, told
+from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+from workflow.shell.output.summary import estimate, told
 
 FREE = "free specimens"
 UNCOUPLED = "difference to a cycle with pressure and shear coupled"

@@ -27,13 +27,13 @@ from workflow.analyses.specimens.summary import (
     tied_pad,
 )
 from workflow.analyses.specimens.wear import BlockState
-from workflow.analyses.wear.datasets import cycles_column, face_mesh, kinetics_columns
+from workflow.analyses.wear.output.datasets import cycles_column, face_mesh, kinetics_columns
 from workflow.shell.analysis import Run
-from workflow.shell.dataset import Dataset, described
-from workflow.shell.reporter import Reporter
-from workflow.shell.results import CurveAxis, On, ResultsWriter, run_results
-from workflow.shell.store import replacing_hdf5
-from workflow.shell.summary import finish
+from workflow.shell.folders.store import replacing_hdf5
+from workflow.shell.output.dataset import Dataset, described
+from workflow.shell.output.results import CurveAxis, On, ResultsWriter, run_results
+from workflow.shell.output.summary import finish
+from workflow.shell.terminal.reporter import Reporter
 
 # Name of the pad's grid, and of the two shapes that are compared with a half-space.
 PAD = "pad"

@@ -34,8 +34,8 @@ from workflow.analyses.specimens.wear import BlockState, FrettedPair, wear_in_cy
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.analysis import Run
 from workflow.shell.few_cells import check_cells
-from workflow.shell.reporter import Reporter
-from workflow.shell.steps import kept_steps
+from workflow.shell.folders.steps import kept_steps
+from workflow.shell.terminal.reporter import Reporter
 
 # Number of states of each force that are stored with their fields: the unworn one, the last, and
 # others evenly spaced in the logarithm of the cycles.

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.doubts import AWAY, RIGID, about_matrices, about_modes
 from workflow.analyses.rig.excitation import (
     Excitation,
@@ -26,7 +27,6 @@ from workflow.analyses.rig.joint_sections import (
     Joint,
     JointLaw,
 )
-from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import (
     ReducedBody,
     Rig,
@@ -40,7 +40,6 @@ from workflow.analyses.rig.structure import (
 from workflow.analyses.wear.case.evolution import PositiveEnergy, TotalEnergy
 from workflow.analyses.wear.case.sections import Cycles
 from workflow.case.fields import Quantity
-from workflow.case.plain import plain, times
 from workflow.case.sections import (
     Case,
     DottedPath,
@@ -52,6 +51,7 @@ from workflow.case.sections import (
     in_its_place,
     one_of,
 )
+from workflow.case.text.plain import plain, times
 
 StepError = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
 JumpError = Annotated[float, Quantity("1", at_least=1e-10, at_most=0.1)]

@@ -32,8 +32,8 @@ from workflow.analyses.time.motion import (
 )
 from workflow.analyses.time.outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
 from workflow.errors import MethodFailed
-from workflow.shell.dataset import Dataset, Datasets
-from workflow.shell.reporter import Reporter
+from workflow.shell.output.dataset import Dataset, Datasets
+from workflow.shell.terminal.reporter import Reporter
 
 # The second mode is searched between these multiples of its frequencies without the joint and with
 # all of it stuck.

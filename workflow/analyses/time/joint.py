@@ -27,8 +27,8 @@ from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.outcome import LOOP, PARAMETERS, State, TimeOutcome, loop_curves
 from workflow.errors import MethodFailed, UserError
-from workflow.shell.dataset import Dataset
-from workflow.shell.reporter import Reporter
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.terminal.reporter import Reporter
 
 # Points of a loop: those of a cosine over a cycle, dense at the reversals.
 LOOP_POINTS = 720

@@ -15,7 +15,7 @@ from workflow.analyses.rig.joint_sections import BoucWenJoint, ElasticJoint, Joi
 from workflow.analyses.rig.laws import Law, Laws, LineLaw, law_of, law_of_all, laws_of
 from workflow.analyses.time.case import TimeCase
 from workflow.analyses.time.outcome import PARAMETERS
-from workflow.analyses.wear.loop_table import read_loop_table
+from workflow.analyses.wear.output.loop_table import read_loop_table
 from workflow.errors import UserError
 
 

@@ -15,8 +15,8 @@ from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.errors import MethodFailed
-from workflow.shell.dataset import Dataset
-from workflow.shell.reporter import Reporter
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.terminal.reporter import Reporter
 
 # Error by time steps, as a share of the largest displacement, from which a warning is given.
 STEPS_LEAVE = 0.05

@@ -8,8 +8,8 @@ from typing import Any
 
 from sa_solver.types import Array
 from workflow.analyses.time.case import JointCase, RigCase
-from workflow.shell.dataset import Dataset, Datasets
-from workflow.shell.results import CurveAxis
+from workflow.shell.output.dataset import Dataset, Datasets
+from workflow.shell.output.results import CurveAxis
 
 # The parameters of a joint that evolve, in the order of reports.
 PARAMETERS = {

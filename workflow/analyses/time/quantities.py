@@ -9,8 +9,8 @@ from typing import Any
 from workflow.analyses.time.case import JointCase, RigCase, joules
 from workflow.analyses.time.outcome import PARAMETERS
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import CurvesOf, SummaryQuantity
-from workflow.shell.summary import estimate, told
+from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+from workflow.shell.output.summary import estimate, told
 
 AGEING, IN_TIME = "jumps in energy, a bound", "displacement, by the steps in time"
 STEADY = "intervals between steady states"

@@ -9,11 +9,11 @@ from workflow.analyses.time.case import JointCase, RigCase, TimeCase, joules
 from workflow.analyses.time.outcome import ALONG, MOTION, State, TimeOutcome
 from workflow.case.fields import in_unit_of
 from workflow.shell.analysis import Run
-from workflow.shell.folder import OutputFolder
-from workflow.shell.reporter import Reporter
-from workflow.shell.results import CurveAxis, run_results
-from workflow.shell.summary import finish, number_at
-from workflow.shell.tables import write_curves
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.output.results import CurveAxis, run_results
+from workflow.shell.output.summary import finish, number_at
+from workflow.shell.output.tables import write_curves
+from workflow.shell.terminal.reporter import Reporter
 
 EVOLUTION = "evolution"
 

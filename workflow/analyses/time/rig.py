@@ -33,7 +33,7 @@ from workflow.analyses.time.motion import (
 )
 from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome, loop_curves
 from workflow.errors import MethodFailed
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 # Cycles in a row that must change little before a state is steady: a single one may do so while a
 # slow mode turns.

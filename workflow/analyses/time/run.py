@@ -10,7 +10,7 @@ from workflow.analyses.time.rig import run_rig
 from workflow.analyses.time.worn_joint import warn_of_table, with_computed_wear
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
-from workflow.shell.steps import kept_steps
+from workflow.shell.folders.steps import kept_steps
 
 
 def run_time(run: Run[JointCase | RigCase]) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from workflow.analyses import wear
+from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.excitation import Harmonic
-from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import JointedBody, ReducedBody
 from workflow.analyses.specimens.run_time import reduction_of
 from workflow.analyses.time.case import JointCase, RigCase

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from workflow.analyses.time.case import JointCase, RigCase
-from workflow.analyses.wear.loop_table import SLIDES, read_loop_table
+from workflow.analyses.wear.output.loop_table import SLIDES, read_loop_table
 from workflow.case.loading import YAML
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
-from workflow.shell.folder import OutputFolder
-from workflow.shell.reporter import Reporter
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.terminal.reporter import Reporter
 
 # A joint is under the load of its table if they differ by less than this share.
 SAME_LOAD = 0.01

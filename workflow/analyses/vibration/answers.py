@@ -11,10 +11,10 @@ from fe_models.dynamics.curves.crossings import motions_at
 from fe_models.dynamics.curves.forced_response import Accuracy, ResponseBranch
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
-from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.harmonics import ANSWER, harmonics_of
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Answers
+from workflow.analyses.vibration.output.harmonics import ANSWER, harmonics_of
+from workflow.analyses.vibration.output.outcome import Answers
 from workflow.analyses.vibration.response import (
     accuracy_of,
     accurate,
@@ -22,8 +22,8 @@ from workflow.analyses.vibration.response import (
     step_control,
     warn_of_error,
 )
-from workflow.shell.dataset import Dataset, Datasets
-from workflow.shell.reporter import Reporter
+from workflow.shell.output.dataset import Dataset, Datasets
+from workflow.shell.terminal.reporter import Reporter
 
 # Share of the vibration. A motion that changes more as harmonics are added is another one.
 ANOTHER = 0.3

@@ -16,9 +16,10 @@ from fe_models.dynamics.curves.further_branches import (
     vibrating_starts,
 )
 from sa_solver.steps import Steps
-from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.case.sections import FurtherStart
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Curves
+from workflow.analyses.vibration.output.outcome import Curves
 from workflow.analyses.vibration.response import (
     accuracy_of,
     amplitude_of,
@@ -26,9 +27,8 @@ from workflow.analyses.vibration.response import (
     progress_along,
     step_control,
 )
-from workflow.analyses.vibration.sections import FurtherStart
 from workflow.analyses.vibration.stability import stability_along
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 
 def further_from(

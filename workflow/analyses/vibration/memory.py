@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from workflow.analyses.rig.matrix_body import MatrixBody
-from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.case_base import VibrationCaseBase
+from workflow.analyses.rig.bodies.matrix_body import MatrixBody
+from workflow.analyses.vibration.case.case_base import VibrationCaseBase
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.shell.memory import Memory
 
 # CURVE_POINTS: points of a forced response, for each of which the motion and the samples of the

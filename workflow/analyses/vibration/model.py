@@ -22,15 +22,15 @@ from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.laws import Laws, grouped, law_of, law_of_all, laws_of
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig
-from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.excitation import FORCE
-from workflow.analyses.vibration.load import Driving, driving_of
+from workflow.analyses.vibration.case.excitation import FORCE
+from workflow.analyses.vibration.case.load import Driving, driving_of
+from workflow.analyses.vibration.case.ring import frequencies_by_diameters
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.memory import memory
-from workflow.analyses.vibration.outcome import RING
-from workflow.analyses.vibration.ring import frequencies_by_diameters
+from workflow.analyses.vibration.output.outcome import RING
 from workflow.errors import MethodFailed
-from workflow.shell.dataset import Dataset
-from workflow.shell.reporter import Reporter
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.terminal.reporter import Reporter
 
 # Number of frequencies of the linear limits, in addition to the natural frequencies. Each takes the
 # inverse of a matrix of all joints' directions, which is slow for many joints.

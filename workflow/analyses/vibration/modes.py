@@ -11,9 +11,9 @@ from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError
 from sa_solver.steps import Steps
 from wear.joints.periodic.march import SLIP
-from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Curves
+from workflow.analyses.vibration.output.outcome import Curves
 from workflow.analyses.vibration.response import (
     LARGEST_ERROR,
     amplitudes_of,
@@ -21,8 +21,8 @@ from workflow.analyses.vibration.response import (
     step_control,
 )
 from workflow.errors import MethodFailed, UserError
-from workflow.shell.dataset import Dataset
-from workflow.shell.reporter import Reporter
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.terminal.reporter import Reporter
 
 # Share of the largest motion of a mode, below which the observed point does not take part.
 STILL = 1e-6

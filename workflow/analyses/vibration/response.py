@@ -33,15 +33,15 @@ from sa_solver.steps import Steps
 from sa_solver.types import Array
 from wear.contact.moving import LARGE_STROKE
 from wear.joints.periodic.march import SEPARATED, SLIP
-from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.harmonics import harmonics_of
-from workflow.analyses.vibration.loops import loops_of
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import DIAMETERS, RESONANCE, Curves, Response
+from workflow.analyses.vibration.output.harmonics import harmonics_of
+from workflow.analyses.vibration.output.loops import loops_of
+from workflow.analyses.vibration.output.outcome import DIAMETERS, RESONANCE, Curves, Response
 from workflow.analyses.vibration.stability import stability_along
 from workflow.errors import MethodFailed
-from workflow.shell.dataset import Dataset, Datasets
-from workflow.shell.reporter import FORECAST, Reporter
+from workflow.shell.output.dataset import Dataset, Datasets
+from workflow.shell.terminal.reporter import FORECAST, Reporter
 
 # Times of a period from which amplitudes are taken. The true amplitude of harmonic 1 is at most
 # 5e-6 larger.

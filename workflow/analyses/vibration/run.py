@@ -13,19 +13,19 @@ from fe_models.dynamics.periodic.receptance import ReceptanceError
 from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
 from workflow.analyses.vibration.answers import answers_under
-from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.further import further_from
-from workflow.analyses.vibration.harmonics import CURVE, harmonics_along, names_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.modes import mode_of, refuse_missing_modes
-from workflow.analyses.vibration.outcome import Curves, Response, VibrationOutcome, trend
+from workflow.analyses.vibration.output.harmonics import CURVE, harmonics_along, names_of
+from workflow.analyses.vibration.output.outcome import Curves, Response, VibrationOutcome, trend
+from workflow.analyses.vibration.output.results import write_vibration_output
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
-from workflow.analyses.vibration.results import write_vibration_output
 from workflow.analyses.vibration.stability import looked_for
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
-from workflow.shell.reporter import Reporter
-from workflow.shell.steps import kept_steps
+from workflow.shell.folders.steps import kept_steps
+from workflow.shell.terminal.reporter import Reporter
 
 # Share of a record's force above its highest harmonic that gives a warning.
 LEFT_OUT = 0.05

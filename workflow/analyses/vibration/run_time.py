@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from math import log
 
-from workflow.analyses.rig.matrix_body import MatrixBody
-from workflow.analyses.rig.point_body import PointBody
+from workflow.analyses.rig.bodies.matrix_body import MatrixBody
+from workflow.analyses.rig.bodies.point_body import PointBody
 from workflow.analyses.rig.structure import FrictionRig, ReducedBody, RowOfMasses, joints_of
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.run_time import reduction_of
-from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.case_base import VibrationCaseBase
+from workflow.analyses.vibration.case.case_base import VibrationCaseBase
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.case.loading import load_case
 from workflow.shell.run_time import RunTime
 

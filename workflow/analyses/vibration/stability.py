@@ -15,11 +15,11 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.stability.floquet import Floquet, Stability
 from sa_solver.steps import Steps
 from sa_solver.types import Array
-from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.excitation import ExcitationSize
+from workflow.analyses.vibration.case.excitation import ExcitationSize
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.shell.dataset import Dataset, Datasets
-from workflow.shell.reporter import Reporter
+from workflow.shell.output.dataset import Dataset, Datasets
+from workflow.shell.terminal.reporter import Reporter
 
 # Values of the column of stability.
 CODES = {"stable": 1, "unknown": 0, "unstable": -1}

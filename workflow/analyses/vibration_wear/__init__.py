@@ -6,7 +6,7 @@ from workflow.analyses.vibration_wear.case import (
     ReducedWearCase,
     VibrationWearCase,
 )
-from workflow.analyses.vibration_wear.quantities import CURVES, main_results
+from workflow.analyses.vibration_wear.output.quantities import CURVES, main_results
 from workflow.analyses.vibration_wear.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
 
@@ -22,9 +22,9 @@ def _run(run: Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]) ->
 
 def _pictures() -> Pictures:
     # Imported here, as plotting takes a second to load.
-    from workflow.analyses.vibration_wear.figures import figures_of
-    from workflow.analyses.vibration_wear.outcome import VibrationWearContents
-    from workflow.analyses.vibration_wear.paraview import write_vibration_wear
+    from workflow.analyses.vibration_wear.output.figures import figures_of
+    from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents
+    from workflow.analyses.vibration_wear.output.paraview import write_vibration_wear
 
     return Pictures(figures_of, write_vibration_wear, contents=VibrationWearContents)
 

@@ -13,7 +13,7 @@ from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.rig_model import JointNodes, RigModel
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.case import ReducedWearCase
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 
 def body_model(case: ReducedWearCase, reporter: Reporter) -> VibrationModel:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import Field, StrictBool, model_validator
 
 from wear.laws import WearLaw
+from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.doubts import AWAY, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency
 from workflow.analyses.rig.joint_sections import FrictionContactJoint, JenkinsJoint, Joint
-from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import (
     FrictionRig,
     ReducedBody,
@@ -21,18 +21,18 @@ from workflow.analyses.rig.structure import (
     RowOfMasses,
     structure_outline,
 )
-from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.case_base import DrivenMass, VibrationCaseBase, wears
-from workflow.analyses.vibration.excitation import Level, VibrationExcitation
+from workflow.analyses.vibration.case.case_base import DrivenMass, VibrationCaseBase, wears
+from workflow.analyses.vibration.case.excitation import Level, VibrationExcitation
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration_wear.node_contacts import NodeContacts, PadContacts
 from workflow.analyses.wear.case.sections import Cycles, Laws, TwoBodies
 from workflow.analyses.wear.case.worn_bodies import BodyWear, wearing
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, Reciprocation
 from workflow.case.fields import Quantity
 from workflow.case.loading import YAML, CaseFile, load_case, outline_of
-from workflow.case.plain import entries, plain, times
 from workflow.case.sections import Section, Title, disagreement, entry, in_its_place, one_of
 from workflow.case.source import Source
+from workflow.case.text.plain import entries, plain, times
 
 if TYPE_CHECKING:
     from workflow.analyses.rig.rig_model import RigModel

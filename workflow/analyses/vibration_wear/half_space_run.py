@@ -22,12 +22,12 @@ from wear.steps.marching import SubcyclingStepper
 from wear.steps.steppers import first_cycles
 from wear.steps.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
-from workflow.analyses.vibration.load import driving_of
-from workflow.analyses.vibration.loops import closed
+from workflow.analyses.vibration.case.load import driving_of
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Response
+from workflow.analyses.vibration.output.loops import closed
+from workflow.analyses.vibration.output.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearCase
-from workflow.analyses.vibration_wear.outcome import (
+from workflow.analyses.vibration_wear.output.outcome import (
     CONTACT,
     HALF_SPACE,
     LOOP,
@@ -44,10 +44,10 @@ from workflow.analyses.vibration_wear.vibrating_contact import ContactCycle, Vib
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
 from workflow.analyses.wear.translation import wear_of
 from workflow.case.loading import load_case
-from workflow.case.plain import counted
-from workflow.shell.dataset import Dataset
+from workflow.case.text.plain import counted
 from workflow.shell.few_cells import check_cells
-from workflow.shell.reporter import Reporter
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.terminal.reporter import Reporter
 
 # Share of the motion of full slip, at which loops in partial slip are compared.
 PARTIAL = 0.5

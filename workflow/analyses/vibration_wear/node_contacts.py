@@ -14,9 +14,9 @@ from workflow.analyses.rig.joint_sections import Joint, JointStiffness
 from workflow.analyses.rig.places import Moved
 from workflow.analyses.wear.case.sections import PressingForce
 from workflow.case.fields import File, Quantity, shown
-from workflow.case.input_files import InputFileError
+from workflow.case.files.input_files import InputFileError
+from workflow.case.files.table_file import TableFile, read_table_file
 from workflow.case.sections import disagreement, entry
-from workflow.case.table_file import TableFile, read_table_file
 from workflow.errors import EntryError
 
 WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]

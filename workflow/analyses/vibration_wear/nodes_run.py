@@ -19,10 +19,10 @@ from wear.steps.steppers import HeunStepper
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.loops import loop_of
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Curves
+from workflow.analyses.vibration.output.loops import loop_of
+from workflow.analyses.vibration.output.outcome import Curves
 from workflow.analyses.vibration.response import step_control, warn_of_stroke
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import (
@@ -30,7 +30,7 @@ from workflow.analyses.vibration_wear.case import (
     NodesWearCase,
     ReducedWearCase,
 )
-from workflow.analyses.vibration_wear.outcome import (
+from workflow.analyses.vibration_wear.output.outcome import (
     LOOP,
     NODES,
     POSITION,
@@ -45,9 +45,9 @@ from workflow.analyses.vibration_wear.outcome import (
 from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
 from workflow.case.loading import load_case
-from workflow.case.plain import counted
-from workflow.shell.dataset import Dataset
-from workflow.shell.reporter import Reporter
+from workflow.case.text.plain import counted
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.terminal.reporter import Reporter
 
 
 def wear_nodes(

@@ -25,7 +25,7 @@ from wear.joints.periodic.march import PeriodicMarch
 from wear.laws import WearLaw
 from wear.steps.stepping import ContactFailure
 from wear.surfaces import Surfaces
-from workflow.analyses.vibration.excitation import FORCE, ExcitationSize
+from workflow.analyses.vibration.case.excitation import FORCE, ExcitationSize
 from workflow.analyses.vibration.model import VibrationModel
 
 # Relative change of a resonance's frequency from one state to the next. Farther away, Newton's

@@ -10,12 +10,12 @@ from wear.steps.stepping import ContactFailure
 from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.half_space_run import wear_half_space
 from workflow.analyses.vibration_wear.nodes_run import wear_nodes
-from workflow.analyses.vibration_wear.results import (
+from workflow.analyses.vibration_wear.output.results import (
     VibrationWearRun,
     write_vibration_wear_output,
 )
 from workflow.errors import MethodFailed, UserError
-from workflow.shell.steps import kept_steps
+from workflow.shell.folders.steps import kept_steps
 
 
 def run_vibration_wear(run: VibrationWearRun) -> None:

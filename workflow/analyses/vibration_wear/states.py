@@ -11,12 +11,12 @@ from sa_solver.steps import Steps
 from wear.steps.marching import advance_cycles
 from wear.steps.steppers import Contact, Stepper
 from wear.worn import State
-from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Response
+from workflow.analyses.vibration.output.outcome import Response
 from workflow.analyses.vibration.response import response_under, warn_of_error
-from workflow.analyses.vibration_wear.outcome import WornRig
-from workflow.shell.reporter import Reporter
+from workflow.analyses.vibration_wear.output.outcome import WornRig
+from workflow.shell.terminal.reporter import Reporter
 
 # Share of the wear in the work for a state; the rest are the responses in it.
 WEAR = 0.2

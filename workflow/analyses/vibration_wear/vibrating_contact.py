@@ -30,7 +30,7 @@ from wear.joints.jenkins import Jenkins
 from wear.joints.periodic.parallel import ParallelSliders
 from wear.steps.stepping import ContactFailure, SlidingCycle, WearingContact, WearState
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.vibration.load import Driving
+from workflow.analyses.vibration.case.load import Driving
 from workflow.analyses.wear.structures.bodies.case import (
     BodiesWearCase,
     Reciprocation,

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.measures import COMPARISON
-from workflow.analyses.wear.quantities import CURVES, main_results
+from workflow.analyses.wear.output.measures import COMPARISON
+from workflow.analyses.wear.output.quantities import CURVES, main_results
 from workflow.analyses.wear.run_time import run_time
 from workflow.analyses.wear.structures import STRUCTURES, structure_of
 from workflow.shell.analysis import Analysis, Pictures, Run
@@ -23,7 +23,7 @@ def _run(run: Run[WearCase]) -> None:
 
 
 def _write_loads(case: WearCase, name: str, out: Path, force: bool) -> Sequence[str]:
-    from workflow.analyses.wear.export import export_resultants
+    from workflow.analyses.wear.output.export import export_resultants
 
     return export_resultants(case, name, out, force)
 
@@ -37,7 +37,7 @@ def _draw_faces(case: WearCase, name: str, out: Path, force: bool) -> Path:
 def _pictures() -> Pictures:
     # Plots take a second to import, so they are imported only where they are drawn.
     from workflow.analyses.wear.figures.wear import figures_of
-    from workflow.analyses.wear.layout import WearContents
+    from workflow.analyses.wear.output.layout import WearContents
     from workflow.analyses.wear.paraview.wear import write_wear
 
     return Pictures(figures_of, write_wear, contents=WearContents)

@@ -18,7 +18,7 @@ from wear.surfaces import Surfaces
 from wear.worn import Spent
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
-from workflow.shell.checkpoint import StoredState, save
+from workflow.shell.folders.checkpoint import StoredState, save
 
 # Arrays over all jumps.
 HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 
 @dataclass(frozen=True)

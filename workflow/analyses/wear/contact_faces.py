@@ -10,8 +10,8 @@ from workflow.analyses.wear.figures.faces import write_faces
 from workflow.analyses.wear.structures import structure_of
 from workflow.errors import UserError
 from workflow.models.structure import StructureLoads
-from workflow.shell.folder import OutputFolder
-from workflow.shell.lock import locked
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.lock import locked
 
 FIGURE = "contact_faces.png"
 

@@ -11,7 +11,7 @@ from sa_solver.surfaces.shapes import rounded_edge
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.surfaces import SurfacesOfTwo
 from workflow.analyses.wear.case.gaps import GapShape, HeightsGap, ParaboloidGap, RoundedGap
-from workflow.case.input_files import read_heights
+from workflow.case.files.input_files import read_heights
 from workflow.models.gaps import AddedGap, GapFunction, GridHeights
 
 

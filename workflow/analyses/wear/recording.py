@@ -13,18 +13,18 @@ from dataclasses import dataclass
 from sa_solver.types import Array
 from wear.coupled import CoupledSettings, CoupledState, Observer, Stage
 from workflow.analyses.wear import checkpoint
-from workflow.analyses.wear.bolts import kept_tensions
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.contact_loops import kept_loops
-from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
-from workflow.case.plain import counted
+from workflow.analyses.wear.checks.warnings import warn_of_growth, warn_of_instability
+from workflow.analyses.wear.worn.bolts import kept_tensions
+from workflow.analyses.wear.worn.contact_loops import kept_loops
+from workflow.case.text.plain import counted
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 from workflow.models.progress import ReportsProgress
-from workflow.shell import steps
 from workflow.shell.analysis import Run
-from workflow.shell.reporter import Reporter
-from workflow.shell.store import write_arrays
+from workflow.shell.folders import steps
+from workflow.shell.folders.store import write_arrays
+from workflow.shell.terminal.reporter import Reporter
 
 
 @contextmanager
@@ -76,8 +76,8 @@ class FileRecorder(Observer):
     """Writer of the fields of every jump and, from time to time, of the state for a restart.
 
     Fields are those at ``peak`` load. ``jumps`` are the digests of the jump files, starting with
-    those of a resumed run. :mod:`workflow.shell.steps` limits the share of time for writing states;
-    the last state is written whatever ends the march, within :meth:`kept`.
+    those of a resumed run. :mod:`workflow.shell.folders.steps` limits the share of time for writing
+    states; the last state is written whatever ends the march, within :meth:`kept`.
     """
 
     run: Run[WearCase]

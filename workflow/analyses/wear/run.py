@@ -17,27 +17,27 @@ from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.budget.finding import Begun, lives_of_companions
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
-from workflow.analyses.wear.choice import report_choice
-from workflow.analyses.wear.contact_workers import (
-    ContactProcesses,
-    contact_workers,
-)
-from workflow.analyses.wear.model import wear_model
-from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
-from workflow.analyses.wear.recording import FileRecorder, RunLog, reported_stage
-from workflow.analyses.wear.results import write_output
-from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.structures.resultants.source import ResultantsSource
-from workflow.analyses.wear.structures.resultants.writing import marched
-from workflow.analyses.wear.translation import check_section
-from workflow.analyses.wear.warnings import (
+from workflow.analyses.wear.checks.warnings import (
     warn_of_contact,
     warn_of_file,
     warn_of_many_jumps,
     warn_of_structure,
     warn_of_worn_cells,
 )
-from workflow.analyses.wear.worn_structure import nonlinearity_sentence
+from workflow.analyses.wear.choice import report_choice
+from workflow.analyses.wear.contact_workers import (
+    ContactProcesses,
+    contact_workers,
+)
+from workflow.analyses.wear.model import wear_model
+from workflow.analyses.wear.output.outcome import InterfaceOutcome, Outcome
+from workflow.analyses.wear.output.results import write_output
+from workflow.analyses.wear.recording import FileRecorder, RunLog, reported_stage
+from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.structures.resultants.writing import marched
+from workflow.analyses.wear.translation import check_section
+from workflow.analyses.wear.worn.worn_structure import nonlinearity_sentence
 from workflow.errors import MethodFailed, UserError
 from workflow.models.contact import ContactEnd
 from workflow.models.contacts import FaceContacts
@@ -45,9 +45,9 @@ from workflow.models.loads import ContactFace, LoadSource
 from workflow.models.structure import StructureLoads
 from workflow.models.wear import WearModel
 from workflow.shell.analysis import Run
-from workflow.shell.cache import DiskStore
+from workflow.shell.folders.cache import DiskStore
 from workflow.shell.processes import Workers
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 # Number of jumps above which the run warns.
 MANY_JUMPS = 300

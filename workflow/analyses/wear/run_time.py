@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import ceil, prod, sqrt
 
 from workflow.analyses.wear.case.base import WearCase
-from workflow.case.plain import counted
+from workflow.case.text.plain import counted
 from workflow.shell.run_time import (
     FRICTIONAL,
     NORMAL,

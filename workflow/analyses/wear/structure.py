@@ -27,7 +27,7 @@ SPECTRA = 300
 DENSE_MATRICES = 6
 
 # Setting that reduces each part of the error of a run. Those for steps and delayed loads depend on
-# the case (workflow.analyses.wear.run_errors).
+# the case (workflow.analyses.wear.checks.run_errors).
 SETTINGS = {
     "link": "the mesh of the contact faces",
     "mesh": "the mesh of the structure",

@@ -12,7 +12,7 @@ from workflow.models.contact import Contact, FaceContact, Wear, WearStepper
 from workflow.models.loads import ContactFace
 from workflow.models.structure import StructureLoads
 from workflow.models.structure_model import StructureModel
-from workflow.shell.cache import DiskStore
+from workflow.shell.folders.cache import DiskStore
 
 AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 

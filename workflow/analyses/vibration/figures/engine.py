@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.vibration.excitation import told_in
-from workflow.analyses.vibration.outcome import VibrationContents
+from workflow.analyses.vibration.case.excitation import told_in
+from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.style import BLACK
 

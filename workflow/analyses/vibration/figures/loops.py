@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.vibration.excitation import told_in, under_in
-from workflow.analyses.vibration.outcome import VibrationContents
+from workflow.analyses.vibration.case.excitation import told_in, under_in
+from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 

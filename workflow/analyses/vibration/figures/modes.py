@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.vibration.outcome import MODES, VibrationContents
+from workflow.analyses.vibration.output.outcome import MODES, VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, plain_ticks, spread
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE

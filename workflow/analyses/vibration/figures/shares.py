@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.vibration.excitation import amount_in, told_in, under_in
+from workflow.analyses.vibration.case.excitation import amount_in, told_in, under_in
 from workflow.analyses.vibration.figures.stability import draw_motions
 from workflow.analyses.vibration.figures.states import (
     COLUMNS,
@@ -21,7 +21,7 @@ from workflow.analyses.vibration.figures.states import (
     kinds_of,
     largest_at,
 )
-from workflow.analyses.vibration.outcome import VibrationContents
+from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import new_figure, plain_ticks, spread, whole_ticks
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, ORANGE

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from sa_solver.types import Array
-from workflow.analyses.vibration.outcome import BIFURCATIONS
+from workflow.analyses.vibration.output.outcome import BIFURCATIONS
 from workflow.pictures.style import BLACK
 
 # Line styles by code of stability. Between two points, the smaller code counts.

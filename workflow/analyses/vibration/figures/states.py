@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.vibration.excitation import amount_in, told_in, under_in
-from workflow.analyses.vibration.outcome import VibrationContents
-from workflow.analyses.vibration.pad_nodes import rows_and_columns
+from workflow.analyses.vibration.case.excitation import amount_in, told_in, under_in
+from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
+from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import new_figure, plain_ticks, spread
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, ORANGE

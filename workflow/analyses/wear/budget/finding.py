@@ -14,12 +14,12 @@ from workflow.analyses.wear.budget.companions import Companions, late, scaled
 from workflow.analyses.wear.budget.lives import LIFE_FAILURES, Worn
 from workflow.analyses.wear.budget.parts import Errors, errors_of
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.outcome import Outcome
+from workflow.analyses.wear.output.outcome import Outcome
 from workflow.analyses.wear.structures import structure_of
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 from workflow.shell.processes import WorkerProcess
-from workflow.shell.reporter import Reporter
+from workflow.shell.terminal.reporter import Reporter
 
 Lives = dict[str, Worn]  # by part
 Told = tuple[Lives, float, list[tuple[str, str]]]  # how fast loads rest, parts that failed and why

@@ -15,8 +15,8 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
-from workflow.analyses.wear.layout import PRESSURES, WORN
-from workflow.analyses.wear.outcome import InterfaceOutcome
+from workflow.analyses.wear.output.layout import PRESSURES, WORN
+from workflow.analyses.wear.output.outcome import InterfaceOutcome
 
 # Powers of energy and pressure in a fretting parameter: Ruiz's is work times tension, that of
 # Smith, Watson and Topper stress times strain, that of Findley a stress.

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from workflow.analyses.wear.budget.parts import ResultError
-from workflow.analyses.wear.layout import PARTS, RESULTS
-from workflow.shell.dataset import Dataset
+from workflow.analyses.wear.output.layout import PARTS, RESULTS
+from workflow.shell.output.dataset import Dataset
 
 Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
 

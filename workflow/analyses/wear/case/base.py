@@ -25,8 +25,8 @@ from workflow.analyses.wear.case.sections import (
 from workflow.analyses.wear.case.worn_bodies import Worn, wearing
 from workflow.case.doubts import idle_steps, uneven_cells
 from workflow.case.fields import shown
-from workflow.case.plain import entries, of_bodies, plain, shares, times
 from workflow.case.sections import Case, Section, Title, disagreement, entry
+from workflow.case.text.plain import entries, of_bodies, plain, shares, times
 
 # Names of the entries of summary and results, which interfaces must not have.
 RESERVED = (

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from workflow.case.fields import File
-from workflow.case.input_files import InputFileError, read_heights
+from workflow.case.files.input_files import InputFileError, read_heights
 from workflow.case.sections import (
     Length,
     RoundingRadius,

@@ -13,8 +13,8 @@ import numpy as np
 from sa_solver.surfaces.scans import rms
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.surfaces import LOST, SurfacesOfTwo
-from workflow.case.plain import plain
 from workflow.case.sections import disagreement
+from workflow.case.text.plain import plain
 
 if TYPE_CHECKING:
     from fe_models.meshes.structure_mesh import Interface

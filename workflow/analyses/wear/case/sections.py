@@ -16,7 +16,6 @@ from workflow.analyses.wear.case.worn_bodies import (
     with_laws,
 )
 from workflow.case.fields import Quantity, Whole
-from workflow.case.plain import plain, shares, times
 from workflow.case.sections import (
     ElasticSection,
     FaceCells,
@@ -27,6 +26,7 @@ from workflow.case.sections import (
     disagreement,
     entry,
 )
+from workflow.case.text.plain import plain, shares, times
 
 if TYPE_CHECKING:
     from workflow.models import structure_model

@@ -15,8 +15,8 @@ from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, We
 from workflow.analyses.wear.case.evolution import Evolution
 from workflow.case import units
 from workflow.case.fields import Quantity, shown
-from workflow.case.plain import alike, entries
 from workflow.case.sections import Length, Section, disagreement, entry
+from workflow.case.text.plain import alike, entries
 
 # Metals wear 1e2 to 1e6 um^3 per joule; a forgotten unit gives 1e16.
 VolumePerEnergy = Annotated[

@@ -6,13 +6,13 @@ from math import ceil
 
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.meshes.transfer import FaceTransfer
+from workflow.analyses.wear.checks.uniformity import sections
 from workflow.analyses.wear.choice import Decision
 from workflow.analyses.wear.fidelity.estimate import Numbers, scales
 from workflow.analyses.wear.fidelity.probe import NOTCH
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import structure_loads
-from workflow.analyses.wear.uniformity import sections
 from workflow.errors import MethodFailed
 
 ENTRY = "structure.dimension"

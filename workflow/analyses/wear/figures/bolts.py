@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.wear.layout import WearContents
+from workflow.analyses.wear.output.layout import WearContents
 from workflow.pictures.panels import (
     blocks,
     changes,

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.wear.layout import WearContents
+from workflow.analyses.wear.output.layout import WearContents
 from workflow.pictures.fields import PROFILE_MARGIN, centres, middle, near_middle, view_of
 from workflow.pictures.panels import (
     blocks,
@@ -24,7 +24,7 @@ from workflow.pictures.panels import (
 )
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE
-from workflow.shell.results import grid_of
+from workflow.shell.output.results import grid_of
 
 COLOURS = BLUE, ORANGE, GREEN
 PRESSURE, SHEAR = ("pressure", "p [MPa]", 1.0), ("shear", "qx [MPa]", 1.0)

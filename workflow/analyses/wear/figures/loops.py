@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.wear.layout import WearContents
-from workflow.analyses.wear.loop_table import SLIDES
+from workflow.analyses.wear.output.layout import WearContents
+from workflow.analyses.wear.output.loop_table import SLIDES
 from workflow.pictures.panels import (
     blocks,
     changes,

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Mask
-from workflow.analyses.wear.layout import WearContents, energy_name
+from workflow.analyses.wear.output.layout import WearContents, energy_name
 from workflow.pictures.panels import (
     blocks,
     change,

@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from sa_solver.types import Array
-from workflow.analyses.wear.body_mesh import body_mesh
-from workflow.analyses.wear.layout import MOMENTS, WearContents
+from workflow.analyses.wear.output.body_mesh import body_mesh
+from workflow.analyses.wear.output.layout import MOMENTS, WearContents
 from workflow.pictures.fields import scaled_panels
 from workflow.pictures.style import BLACK
-from workflow.shell.results import grid_of
+from workflow.shell.output.results import grid_of
 
 STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
 CHANGE = "worn less unworn"

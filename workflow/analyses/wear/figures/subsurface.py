@@ -13,7 +13,7 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
 from sa_solver.types import Array, Grid
-from workflow.analyses.wear.layout import MOMENTS, WearContents
+from workflow.analyses.wear.output.layout import MOMENTS, WearContents
 from workflow.pictures.fields import (
     FLAT,
     PROFILE_MARGIN,
@@ -34,7 +34,7 @@ from workflow.pictures.panels import (
 )
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, ORANGE
-from workflow.shell.results import grid_of
+from workflow.shell.output.results import grid_of
 
 COLOURS = "magma_r"
 LEVELS = 24

@@ -20,7 +20,7 @@ from workflow.analyses.wear.figures.loops import loops
 from workflow.analyses.wear.figures.resultants import resultants
 from workflow.analyses.wear.figures.structure_stress import structure_stress
 from workflow.analyses.wear.figures.subsurface import fretting_life, subsurface_stress
-from workflow.analyses.wear.layout import EXTRAPOLATION, WearContents
+from workflow.analyses.wear.output.layout import EXTRAPOLATION, WearContents
 from workflow.pictures.fields import (
     MAP_PERCENTILE,
     MAX_PROFILES,
@@ -45,7 +45,7 @@ from workflow.pictures.panels import (
 )
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
-from workflow.shell.results import grid_of
+from workflow.shell.output.results import grid_of
 
 # Colour, marker, its size and fill: bodies of one material wear equally, and the second must not
 # hide the first.

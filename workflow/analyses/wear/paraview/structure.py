@@ -8,8 +8,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from workflow.analyses.wear.body_mesh import body_mesh
-from workflow.analyses.wear.layout import WearContents
+from workflow.analyses.wear.output.body_mesh import body_mesh
+from workflow.analyses.wear.output.layout import WearContents
 from workflow.pictures.vtk import CYCLES, INCREMENTS, Step, attach, write_series
 
 # Fields of a body, with units; its surface over the increments has no tensors.

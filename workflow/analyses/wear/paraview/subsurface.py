@@ -11,7 +11,7 @@ import numpy as np
 
 from fe_models.elasticity.stress import turned
 from sa_solver.types import Array, Frame
-from workflow.analyses.wear.layout import WearContents
+from workflow.analyses.wear.output.layout import WearContents
 from workflow.pictures.vtk import (
     CYCLES,
     FacePoints,
@@ -21,7 +21,7 @@ from workflow.pictures.vtk import (
     quadrilaterals,
     write_series,
 )
-from workflow.shell.results import frame_of
+from workflow.shell.output.results import frame_of
 
 if TYPE_CHECKING:
     import pyvista

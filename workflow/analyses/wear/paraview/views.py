@@ -7,7 +7,7 @@ from pathlib import Path
 
 import h5py
 
-from workflow.analyses.wear.layout import WearContents
+from workflow.analyses.wear.output.layout import WearContents
 from workflow.pictures.view import FIRST, PictureScene, Shown, View, write_view
 from workflow.pictures.vtk import CYCLES, INCREMENTS, PROFILE
 

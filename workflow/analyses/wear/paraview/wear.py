@@ -27,8 +27,8 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import Face
 from fe_models.meshes.transfer import FaceTransfer
-from workflow.analyses.wear.datasets import OTHER_FACE
-from workflow.analyses.wear.layout import WearContents, jump_name
+from workflow.analyses.wear.output.datasets import OTHER_FACE
+from workflow.analyses.wear.output.layout import WearContents, jump_name
 from workflow.analyses.wear.paraview.structure import write_structure
 from workflow.analyses.wear.paraview.subsurface import write_life, write_sections
 from workflow.analyses.wear.paraview.views import write_views
@@ -41,7 +41,7 @@ from workflow.pictures.vtk import (
     write_series,
     write_stl,
 )
-from workflow.shell.results import frame_of, grid_of
+from workflow.shell.output.results import frame_of, grid_of
 
 
 def write_wear(contents: WearContents, file: h5py.File, folder: Path) -> list[Path]:

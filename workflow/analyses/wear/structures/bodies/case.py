@@ -43,10 +43,10 @@ from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.case.sections import ContactSection, Cycles, PressingForce, WearSection
 from workflow.case.doubts import heights, long_stroke
 from workflow.case.fields import Quantity, Whole
-from workflow.case.input_files import read_heights
-from workflow.case.plain import plain, shares
+from workflow.case.files.input_files import read_heights
 from workflow.case.sections import GridCells, Length, LineCells, Section, Title, disagreement, entry
 from workflow.case.source import Source
+from workflow.case.text.plain import plain, shares
 
 PressingLineForce = Annotated[
     float, Quantity("N/mm", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN/mm")

@@ -25,7 +25,7 @@ from workflow.analyses.wear.structures.bodies.case import (
     TwoBodiesWearCase,
     with_held,
 )
-from workflow.case.input_files import read_heights
+from workflow.case.files.input_files import read_heights
 from workflow.models.gaps import GapFunction, GridHeights
 from workflow.models.loads import (
     COARSER,

@@ -24,8 +24,8 @@ from workflow.analyses.wear.case.sections import (
 from workflow.analyses.wear.structures.dovetail.flank_surfaces import MeasuredFlanks
 from workflow.case.doubts import pressed
 from workflow.case.fields import AUTO, Auto, OrAuto, Quantity, Whole
-from workflow.case.plain import plain, shares
 from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry, together
+from workflow.case.text.plain import plain, shares
 
 if TYPE_CHECKING:
     from fe_models.geometry.dovetail import Dovetail as Geometry

@@ -60,8 +60,8 @@ from workflow.analyses.wear.structures.mesh.pretension import check_bolts
 from workflow.analyses.wear.structures.mesh.temperatures import check_temperatures
 from workflow.case.changing import changed
 from workflow.case.fields import AUTO
-from workflow.case.plain import counted, listed, told_of_body
 from workflow.case.sections import Length, Section, Title, disagreement, entry
+from workflow.case.text.plain import counted, listed, told_of_body
 from workflow.models.faces import face_size
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from workflow.case.plain import counted
+from workflow.case.text.plain import counted
 
 if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh

@@ -9,9 +9,9 @@ import numpy as np
 from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from workflow.analyses.wear.case.gaps import Gap, HeightsGap
 from workflow.analyses.wear.case.scanned import MIRRORED
-from workflow.case.input_files import read_heights
-from workflow.case.plain import counted, shape_in_words
+from workflow.case.files.input_files import read_heights
 from workflow.case.sections import Section, disagreement
+from workflow.case.text.plain import counted, shape_in_words
 from workflow.models.faces import face_size, planes_of_symmetry
 
 # Relative rounding error of shared areas; and the least shared part of the smaller face, which may

@@ -9,8 +9,8 @@ from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
 from workflow.case.fields import Quantity, Text
-from workflow.case.plain import entries
 from workflow.case.sections import Section, entry
+from workflow.case.text.plain import entries
 
 Name = Annotated[str, Text()]
 Factor = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]

@@ -22,7 +22,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
 )
 from workflow.case.doubts import WEAK, pressed
 from workflow.case.fields import File, Word
-from workflow.case.plain import plain
+from workflow.case.text.plain import plain
 
 if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh

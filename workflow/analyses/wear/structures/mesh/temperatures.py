@@ -12,9 +12,9 @@ from sa_solver.types import Array, Indices
 from workflow.analyses.wear.case.sections import NonlinearitySection
 from workflow.analyses.wear.structures.mesh.load import KINDS, MeshLoad, Name
 from workflow.case.fields import File, Quantity
-from workflow.case.input_files import InputFileError
+from workflow.case.files.input_files import InputFileError
+from workflow.case.files.table_file import read_table_file
 from workflow.case.sections import disagreement, entry
-from workflow.case.table_file import read_table_file
 
 if TYPE_CHECKING:
     from fe_models.elasticity import thermal as fe

@@ -20,9 +20,9 @@ from workflow.analyses.wear.structures.resultants.faces import FaceError
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
 from workflow.case.doubts import pressed, uneven_cells
 from workflow.case.fields import File, OrAlone, Quantity, shown, split_dataset
-from workflow.case.input_files import InputFileError
-from workflow.case.plain import between, plain, shape_in_words
+from workflow.case.files.input_files import InputFileError
 from workflow.case.sections import Length, Section, Title, disagreement, entry
+from workflow.case.text.plain import between, plain, shape_in_words
 
 # Deviation of x and normal from a right angle that is accepted, for numbers with six digits.
 PERPENDICULAR = 1e-6
@@ -336,7 +336,7 @@ class ResultantsCase(WearCase):
             check_cells(loads.height.shape, structure.file, self.cells)
 
     def _check_nodes(self, name: str, loads: ImportedLoads) -> None:
-        from workflow.analyses.wear.worn_nodes import check_nodes
+        from workflow.analyses.wear.worn.worn_nodes import check_nodes
 
         structure = self.structure
         frame = structure.frame_of(name) or loads.frame

@@ -12,7 +12,7 @@ from sa_solver.tangential.gross_slip import GROSS_SHARE
 from sa_solver.types import Array, LoadHistory, Mask
 from workflow.analyses.wear.case.sections import SHARES_APART
 from workflow.analyses.wear.structures.resultants.imported import COLUMNS
-from workflow.case.input_files import InputFileError
+from workflow.case.files.input_files import InputFileError
 
 # Numbers below this share of a column's largest value are remainders of an iterative solver.
 REMAINDER = 1e-6

@@ -25,10 +25,10 @@ from workflow.analyses.wear.structures.resultants.imported import (
     tilt_of,
 )
 from workflow.case import units
-from workflow.case.input_files import InputFileError, open_hdf5
-from workflow.case.table_file import check_unit
-from workflow.shell.dataset import unit_in
-from workflow.shell.results import frame_of
+from workflow.case.files.input_files import InputFileError, open_hdf5
+from workflow.case.files.table_file import check_unit
+from workflow.shell.output.dataset import unit_in
+from workflow.shell.output.results import frame_of
 
 LOADS = "load_history"
 # Datasets in a group in addition to the loads: those that are read, and others of our results.

@@ -9,8 +9,8 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import Face
 from sa_solver.types import Array, Frame, Indices, LoadHistory, Tilt
-from workflow.analyses.contact.datasets import LOADS
-from workflow.shell.dataset import unit_in
+from workflow.analyses.contact.output.datasets import LOADS
+from workflow.shell.output.dataset import unit_in
 
 COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
 MOMENTS = ("Mx", "My")

@@ -25,8 +25,8 @@ from workflow.analyses.wear.structures.resultants.imported import (
     tilt_of,
 )
 from workflow.case.fields import Quantity, shown, split_dataset
-from workflow.case.input_files import InputFileError
-from workflow.case.table_file import TableFile, read_table_file
+from workflow.case.files.input_files import InputFileError
+from workflow.case.files.table_file import TableFile, read_table_file
 
 INTERFACE, INCREMENT, SLIDING = "interface", "increment", "sliding"
 # Allowed names: they become groups of results and columns of tables.

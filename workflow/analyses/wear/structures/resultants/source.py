@@ -15,7 +15,7 @@ from wear.contact.face_loads import CycleLoads
 from workflow.analyses.wear.gaps import gap_over, with_measured
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
-from workflow.analyses.wear.worn_nodes import read_nodes
+from workflow.analyses.wear.worn.worn_nodes import read_nodes
 from workflow.models.loads import (
     BODIES,
     COARSER,

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from fe_models.meshes.structure_mesh import Interface
 from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array, LoadHistory
-from workflow.analyses.contact.datasets import load_columns, slip_field
-from workflow.analyses.wear.datasets import face_mesh, nodal_solution
+from workflow.analyses.contact.output.datasets import load_columns, slip_field
+from workflow.analyses.wear.output.datasets import face_mesh, nodal_solution
 from workflow.analyses.wear.structures.resultants.consistency import MIX
 from workflow.analyses.wear.structures.resultants.imported import CLOSURE, base_units
-from workflow.shell.dataset import Dataset
-from workflow.shell.results import ResultsWriter, writing
-from workflow.shell.tables import heading, write_table
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.output.results import ResultsWriter, writing
+from workflow.shell.output.tables import heading, write_table
 
 NOTE = "forces and moments of body 1 on body 2, in the frame of each interface"
 

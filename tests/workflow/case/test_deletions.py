@@ -1,0 +1,109 @@
+"""Entries of templates are left out: they are refused by name, or ``check`` shows the default."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+from tests.marks import slow
+from tests.workflow.case.mutants import places, written
+from workflow.case.sections import LAST, Case
+from workflow.case.text.leaves import taken
+from workflow.case.text.writing import dump_case
+from workflow.errors import CaseError
+from workflow.kinds import kinds, load_case, parse_case, template
+
+QUICK = "joint", "line"
+
+
+def told(case: Case) -> list[tuple[str, str]]:
+    return [*case.outline(), *taken(case)]
+
+
+def without(tree: Any, place: tuple[str | int, ...]) -> str:
+    tree = copy.deepcopy(tree)
+    around = tree
+    for key in place[:-1]:
+        around = around[key]
+    del around[place[-1]]
+    return written(tree)
+
+
+@pytest.mark.parametrize("kind", [kind if kind in QUICK else slow(kind) for kind in kinds()])
+def test_whatever_is_left_out_is_asked_for_or_told(kind: str, folders: dict[str, Path]) -> None:
+    name = str(folders[kind] / "case.yaml")
+    tree = YAML(typ="safe", pure=True).load(template(kind))
+    whole, unnamed = parse_case(written(tree), name), list[str]()
+    for place in places(tree):
+        if place[0] in ("title", *LAST):
+            continue
+        try:
+            case = parse_case(without(tree, place), name)
+        except CaseError as error:
+            named = any(str(key) in str(error) for key in place)
+        else:
+            named = case == whole or told(case) != told(whole)
+        if not named:
+            unnamed.append(".".join(map(str, place)))
+    assert not unnamed
+
+
+def test_a_case_with_every_default_written_out_takes_none(dovetail_path: Path) -> None:
+    case = load_case(dovetail_path, ["mesh={size: 6 mm}", "wear.step={}"])
+    ((name, text),) = taken(case)
+    assert name == "defaults"
+    for entry in ("mesh.order 1", "wear.step.kind implicit", "accuracy 0.05"):
+        assert entry in text.split(", ")
+    assert "mesh.size" not in text
+    assert "loops" not in text  # there are none
+    assert taken(parse_case(dump_case(case), "case.yaml")) == []
+
+
+def test_of_items_alike_the_default_is_told_once(folders: dict[str, Path]) -> None:
+    legs = "load_path.legs=[{P: 400 N}, {Qx: 100 N}]"
+    case = parse_case(template("bodies"), str(folders["bodies"] / "case.yaml"), [legs])
+    ((_, text),) = taken(case)
+    assert text.count("load_path.legs.*.increments 1") == 1
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("frequencies=[20]", "a list of 1: too short; allowed: a longer one, such as [20 Hz, 400 "),
+        ("forces=5", "not a list; allowed: a list, such as [10 N, 40 N]"),
+    ],
+)
+def test_an_example_is_that_of_the_entry(override: str, words: str) -> None:
+    with pytest.raises(CaseError) as refusal:
+        parse_case(template("vibration"), "case.yaml", [override])
+    assert words in str(refusal.value)
+
+
+def test_what_is_wrong_in_a_list_is_told_alone() -> None:
+    """The message does not also say that the list is too short."""
+    with pytest.raises(CaseError) as refusal:
+        parse_case(template("vibration"), "case.yaml", ["forces=[nix]"])
+    assert str(refusal.value).startswith("--set forces=[nix]: forces.0: 'nix': not a number with")
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "key", "words"),
+    [
+        ("bodies", "contact", "half-space grid, with size below it"),
+        ("joint", "drive", "motion that is imposed on the joint, with stroke, frequency below it"),
+        ("mesh", "structure.contacts.0.x.0", "a longer one, such as [1.0, 0.0, 0.0]"),
+    ],
+)
+def test_what_is_missing_is_told_with_what_is_below(
+    kind: str, key: str, words: str, folders: dict[str, Path]
+) -> None:
+    tree = YAML(typ="safe", pure=True).load(template(kind))
+    place = tuple(int(part) if part.isdecimal() else part for part in key.split("."))
+    with pytest.raises(CaseError) as refusal:
+        parse_case(without(tree, place), str(folders[kind] / "case.yaml"))
+    assert words in str(refusal.value)

@@ -1,0 +1,130 @@
+"""Tests of ``fretscale describe``: the picture of an assembly and its file for ParaView."""
+
+import json
+
+import meshio
+import numpy as np
+import pytest
+import pyvista as pv
+
+from fe_models.geometry.imported import patch, read_bodies
+from tests.fe_models.readers import cae_files
+from tests.workflow.command_line import invoke
+from tests.workflow.mesh_scenes import edit
+from tests.workflow.output.figure_checks import problems
+from workflow.commands.assembly import shown_bodies
+from workflow.commands.assembly_figure import MOST_BODIES, figure
+
+pytestmark = pytest.mark.usefixtures("reads_here")
+
+
+@pytest.fixture
+def file(blocks):
+    """Return two blocks with a node at a corner, and the nodes of a face."""
+    path = blocks.with_name("blocks.inp")
+    sets = "*Nset, nset=tip\n27\n*Nset, nset=nodes_high, generate\n19, 27, 1\n"
+    edit(path, "*End Part\n*Assembly", f"{sets}*End Part\n*Assembly")
+    return path
+
+
+def test_assembly_is_drawn_and_written(file, tmp_path):
+    out = tmp_path / "drawn"
+    ending = invoke("describe", file, "--out", out)
+    assert ending.exit_code == 0, ending.stderr
+    assert "node set nodes_high: 9 nodes, a face of triangles" in ending.output
+    assert ending.output.splitlines()[-2:] == [str(out / f"assembly.{s}") for s in ("png", "vtu")]
+    assert (out / "assembly.png").stat().st_size > 10_000
+    again = invoke("describe", file, "--out", out)
+    assert again.exit_code == 2
+    assert "--force" in again.stderr
+    assert invoke("describe", file, "--out", out, "--force").exit_code == 0
+
+
+def test_groups_are_in_the_file_for_paraview(file, tmp_path):
+    """It has the surfaces of bodies and boundaries, each facet once, and the node numbers."""
+    assert invoke("describe", file, "--out", tmp_path / "drawn").exit_code == 0
+    grid = pv.read(tmp_path / "drawn" / "assembly.vtu")
+    imported = read_bodies(file)
+    sizes = grid.compute_cell_sizes(length=False)
+    for number, (name, size) in enumerate({"Base-1": 24.0, "Foot-1": 6.0}.items(), start=1):
+        mine = grid.cell_data[f"body {number} {name}"] == 1
+        np.testing.assert_array_equal(mine, grid.cell_data["body"] == number)
+        assert sizes.cell_data["Area"][mine].sum() == pytest.approx(size, rel=1e-5)
+        body = imported.bodies[name]
+        for boundary in body.mesh.boundaries:
+            facets = grid.extract_cells(grid.cell_data[f"boundary {boundary}"] == 1)
+            expected = patch(body, boundary)
+            area = facets.compute_cell_sizes(length=False, volume=False).cell_data["Area"].sum()
+            assert area == pytest.approx(expected.area, rel=1e-5)
+            centres = facets.cell_centers().points.mean(axis=0)
+            np.testing.assert_allclose(centres, expected.centroid, atol=1e-6)
+    tip = grid.point_data["node set tip"] == 1
+    np.testing.assert_allclose(grid.points[tip], [[1.5, 1.5, 3.0]])
+    assert grid.point_data["node"][tip].tolist() == [27]
+    assert np.all(
+        grid.cell_data["boundary nodes_high"] == grid.cell_data["boundary foot_high"]
+    ) or (np.sum(grid.cell_data["boundary nodes_high"]) == 8)
+
+
+def test_picture_tells_faces_and_sizes(file):
+    bodies = shown_bodies(read_bodies(file))
+    drawn = figure(bodies, "blocks.inp")
+    drawn.canvas.draw()
+    assert problems(drawn) == []
+    titles = [part.get_suptitle() for part in drawn.subfigs]
+    assert titles == ["all bodies", "Base-1, 2 x 2 x 2 mm", "Foot-1, 1 x 1 x 1 mm"]
+    legends = [
+        [text.get_text() for text in part.axes[-1].get_legend().get_texts()]
+        for part in drawn.subfigs
+    ]
+    assert legends[0] == ["Base-1", "Foot-1"]
+    assert legends[2] == ["1 foot_low", "2 foot_high", "3 foot_cut", "4 nodes_high", "• tip"]
+    # Of the foot: the face twice named and the cut from above, its sole from below.
+    seen = [{text.get_text() for text in axis.texts} - set("xyz") for axis in drawn.subfigs[2].axes]
+    assert seen == [{"2, 4", "3"}, {"1"}]
+
+
+def test_only_what_is_turned_to_the_eye_is_drawn(file):
+    """Half of a convex body's facets are drawn, and none of the other half."""
+    (_, base, _) = figure(shown_bodies(read_bodies(file)), "blocks.inp").subfigs
+    for axis in base.axes:
+        (surface,) = axis.collections
+        assert len(surface.get_paths()) == 24
+
+
+def test_plane_bodies_are_drawn_to_scale(tmp_path):
+    path = tmp_path / "plate.inp"
+    surfaces = "*Surface, name=low\n1, S1\n*Surface, name=right\n2, S2\n"
+    path.write_text(cae_files.abaqus(*cae_files.mixed_plate()) + surfaces)
+    assert invoke("describe", path, "--out", tmp_path / "drawn").exit_code == 0
+    grid = pv.read(tmp_path / "drawn" / "assembly.vtu")
+    assert sorted(set(grid.celltypes)) == [3, 5]
+    drawn = figure(shown_bodies(read_bodies(path)), "plate.inp")
+    drawn.canvas.draw()
+    assert problems(drawn) == []
+    (axis,) = drawn.subfigs[0].axes
+    assert axis.get_xlabel() == "x [mm]"
+    assert axis.get_aspect() == 1.0
+
+
+def test_many_bodies_and_faces_are_counted(tmp_path):
+    """If there are too many for distinct colours in the picture, a list names them."""
+    corners, cells = cae_files.mixed_column()
+    cell = cells["hexahedron"][:1]
+    count = MOST_BODIES + 3
+    points = np.concatenate([corners + np.array([3.0 * k, 0, 0]) for k in range(count)])
+    blocks = [("hexahedron", cell + len(corners) * k) for k in range(count)]
+    path = tmp_path / "row.vtu"
+    meshio.Mesh(points, blocks).write(path)
+    drawn = figure(shown_bodies(read_bodies(path)), "row.vtu")
+    assert drawn.get_suptitle() == f"row.vtu: {count} bodies; 3 more are not drawn"
+    assert len(drawn.subfigs) == 1 + MOST_BODIES
+
+
+def test_what_is_drawn_is_what_the_case_may_name(blocks):
+    """Every group of the case is in the picture."""
+    case = json.dumps(blocks.read_text("utf-8"))
+    bodies = shown_bodies(read_bodies(blocks.with_name("blocks.inp")))
+    for body in bodies:
+        assert body.name in case
+        assert any(face in case for face in body.faces)

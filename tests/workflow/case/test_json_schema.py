@@ -1,0 +1,194 @@
+"""The schema for editors is standard, fully described, and accepts every valid case."""
+
+import json
+
+import jsonschema
+import pytest
+from ruamel.yaml import YAML
+
+from tests.conftest import CASES
+from tests.marks import slow
+from tests.workflow.case.mutants import Mutants, sources
+from tests.workflow.command_line import invoke
+from workflow.case.source import Source
+from workflow.errors import CaseError
+from workflow.fit.template import FITS, fit_template
+from workflow.kinds import about, kinds, parse_case, template
+from workflow.sweep.template import sweep_template
+
+FILES = sorted([*CASES.glob("*.yaml"), *CASES.glob("sweeps/*.yaml")])
+
+
+@pytest.fixture(scope="module")
+def schema():
+    ending = invoke("schema")
+    assert ending.exit_code == 0
+    return json.loads(ending.stdout)
+
+
+@pytest.fixture(scope="module")
+def validator(schema):
+    return jsonschema.Draft202012Validator(schema)
+
+
+def text_of(kind):
+    if kind in FITS:
+        return fit_template(kind)
+    return sweep_template() if kind == "sweep" else template(kind)
+
+
+def plain(text):
+    return YAML(typ="safe", pure=True).load(text)
+
+
+def test_it_is_of_its_dialect(schema):
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert "$id" not in schema
+    titles = [schema["$defs"][one["$ref"].rpartition("/")[2]]["title"] for one in schema["oneOf"]]
+    assert titles == [*kinds(), "sweep", *FITS]
+
+
+def test_every_entry_is_described(schema):
+    bare = [
+        f"{name}.{key}"
+        for name, definition in schema["$defs"].items()
+        for section in (definition, *definition.get("anyOf", ()))
+        for key, entry in section.get("properties", {}).items()
+        if not entry.get("description")
+    ]
+    assert not bare
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_fixed_words_tell_the_kinds_apart(schema, kind):
+    """An editor then proposes only the entries of the kind."""
+    (case,) = [d for d in schema["$defs"].values() if d.get("title") == kind]
+    assert case["description"] == about()[kind]
+    assert case["additionalProperties"] is False
+    assert "const" in case["properties"]["analysis"]
+    structure = case["properties"]["structure"]
+    for one in structure.get("oneOf", [structure]):
+        of_one = schema["$defs"][one["$ref"].rpartition("/")[2]]
+        assert "const" in of_one["properties"]["kind"]
+        assert "kind" in of_one["required"]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_shipped_files_are_valid(validator, path):
+    assert validator.is_valid(plain(path.read_text("utf-8")))
+
+
+@pytest.mark.parametrize("kind", [*kinds(), "sweep", *FITS])
+def test_templates_are_valid(validator, kind):
+    assert validator.is_valid(plain(text_of(kind)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "new"),
+    [
+        ("dovetail", "analysis: wear", "analysis: contact"),
+        ("dovetail", "kind: dovetail", "kind: doevtail"),
+        ("dovetail", "flank_angle: 45 deg", "flank_angle: '45'"),
+        ("dovetail", "flank_angle: 45 deg", "flank_angle: 5,3 mm"),
+        ("dovetail", "flank_angle: 45 deg", "flank_angel: 45 deg"),
+        ("dovetail", "grid: [128, 256]", "grid: [128, 256, 1]"),
+        ("dovetail", "grid: [128, 256]", "grid: [128, 256.5]"),
+        ("dovetail", "law: energy ", "law: work "),
+        ("dovetail", "    young: 115 GPa", "    # young: 115 GPa"),
+        ("mesh", "kind: pressure", "kind: presure"),
+        ("mesh", "pressure: 10 MPa", "force: 10 MPa"),
+        ("bodies", "shape: sphere", "shape: cylinder"),
+        ("bodies", "  radius: 10 mm", "  # radius: 10 mm"),
+        ("line", "size: 2 mm", "size: [2 mm, 2 mm]"),
+        ("rig", "kind: harmonic", "kind: hammer"),
+        ("vibration", "forces: [10 N, 40 N]", "forces: 10 N"),
+        ("dovetail", "end_radius: 150 mm", "# end_radius: 150 mm"),
+        ("dovetail", "slot_length: 60 mm", "slot_length: -60 mm"),
+        ("bodies", "  legs:", "  # legs:"),
+        ("joint", "  cycles: 1080000.0", "  # cycles: 1080000.0"),
+        ("specimens", "  cycles: 300000.0", "  # cycles: 300000.0"),
+        ("sweep", "design: grid", "design: all"),
+        ("sweep", "values: [0.3, 0.4, 0.5]", "value: 0.3"),
+        ("fit_joint", "change: free", "change: fre"),
+        ("fit_wear", "law: energy ", "law: archard "),
+        ("fit_profiles", "aligned: false", "aligned: no x"),
+    ],
+)
+def test_wrong_files_are_not(validator, kind, old, new):
+    text = text_of(kind)
+    assert old in text
+    assert not validator.is_valid(plain(text.replace(old, new, 1)))
+
+
+@pytest.mark.parametrize("none", ["contacts", "supports", "loads"])
+def test_what_must_be_there_is_not_empty(validator, none):
+    case = plain(template("mesh"))
+    case["structure"][none] = []
+    assert not validator.is_valid(case)
+
+
+def test_what_stands_for_nothing_is_valid(validator):
+    """An empty entry is one that is not given, as for the loader."""
+    case = plain(template("dovetail"))
+    case["structure"] |= {"dimension": 2, "end_width": None}
+    del case["structure"]["end_radius"]
+    assert validator.is_valid(case)
+
+
+# Mutants whose data the schema is asked about, too: those that keep the case apart from their text.
+MUTANTS = 60
+
+
+@pytest.mark.parametrize("block", [0, *map(slow, range(1, 40))])
+def test_whatever_the_loader_takes_is_valid(validator, block, folders):
+    """The schema may be less strict than the loader, but never stricter."""
+    mutants, wrong = Mutants(sources()), []
+    name = str(folders["resultants"] / "mutant.yaml")
+    for number in range(block * MUTANTS, (block + 1) * MUTANTS):
+        mutant = mutants[number]
+        if mutant.overrides:
+            continue
+        try:
+            text = mutant.text.decode()
+            parse_case(text, name)
+            data = json.loads(json.dumps(Source(name, text).data))
+        except (CaseError, UnicodeDecodeError, ValueError):
+            continue
+        if not validator.is_valid(data):
+            wrong.append(f"{number}: {mutant.told}")
+    assert not wrong
+
+
+@pytest.mark.parametrize(
+    ("body", "valid"),
+    [
+        ("Ti-6Al-4V", True),
+        ({"material": "100Cr6", "young": "210 GPa"}, True),
+        ({"young": 1e5, "poisson": 0.3}, True),
+        ("rigid", True),
+        ("steel", False),
+        ({"young": 1e5}, False),
+        ({"material": "steel"}, False),
+        ({"young": 1e5, "poisson": 0.3, "density": 1e-9}, False),
+    ],
+)
+def test_a_body_has_a_name_or_numbers(validator, body, valid):
+    case = plain(template("bodies"))
+    case["materials"]["body_1"] = body
+    assert validator.is_valid(case) is valid
+
+
+@pytest.mark.parametrize(
+    ("entries", "valid"),
+    [
+        ({"coefficient": 1e-4, "hardness": "3 GPa"}, True),
+        ({"specific_wear_rate": "1e-5 mm^3/(N*m)"}, True),
+        ({"coefficient": 1e-4}, False),
+        ({"coefficient": 1e-4, "hardness": "3 GPa", "specific_wear_rate": 1e-8}, False),
+    ],
+)
+def test_archard_has_k_once(validator, entries, valid):
+    case = plain(template("bodies_wear"))
+    case["wear"]["body_1"] = {"law": "archard"} | entries
+    assert validator.is_valid(case) is valid

@@ -1,0 +1,184 @@
+"""Tests of the comparison of finished runs: equal entries, differences, and their errors."""
+
+import csv
+
+import fretscale
+import h5py
+import numpy as np
+import pytest
+
+from tests.workflow.conftest import invoke
+from tests.workflow.output.test_report import QUIET, Page
+from tests.workflow.scenes import BALL
+from workflow.comparing import compare
+from workflow.errors import UserError
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.output.curves import curves_in
+from workflow.shell.output.quantities import CurvesOf
+
+JOINT = """\
+title: Spring and slider
+analysis: time
+structure: {kind: joint}
+joint: {law: jenkins, normal_load: 100 N, friction: 0.5, stiffness: 10 N/um}
+drive: {stroke: 40 um, frequency: 10 Hz}
+ageing: {cycles: 1000}
+"""
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Return folders of finished runs: a ball, one with more friction, the first again, a joint."""
+    folder = tmp_path_factory.mktemp("compared")
+    cases = {
+        "ball": (BALL, ()),
+        "rough": (BALL, ("friction.coefficient=0.9",)),
+        "again": (BALL.replace("Ball", "The same ball"), ()),
+        "joint": (JOINT, ("output.figures=false",)),
+    }
+    for name, (text, overrides) in cases.items():
+        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+        quiet = QUIET[1:] if name == "joint" else QUIET
+        settings = [part for entry in (*quiet, *overrides) for part in ("--set", entry)]
+        ended = invoke("run", folder / f"{name}.yaml", "--out", folder / name, *settings)
+        assert ended.exit_code == 0, ended.stderr
+    return folder
+
+
+def test_what_differs_is_told_and_what_exceeds_the_errors_marked(runs):
+    compared = compare([runs / "ball", runs / "rough", runs / "again"])
+    assert compared.names == ["ball", "rough", "again"]
+    assert compared.entries == {"friction.coefficient": ("0.7", "0.9", "0.7")}
+    rows = {row.first.path.removeprefix("states.-1."): row for row in compared.rows}
+    assert rows["peak_pressure"].difference(1) == pytest.approx(0.0, abs=1e-9)
+    assert rows["peak_pressure"].beyond(1) is None
+    first, other, _ = rows["cumulative_energy"].values
+    assert rows["cumulative_energy"].difference(1) == pytest.approx(other / first - 1.0)
+    # Less of the contact slips where friction is larger.
+    assert rows["cumulative_energy"].difference(1) < -0.02
+    assert rows["cumulative_energy"].beyond(1) is True
+    assert rows["cumulative_energy"].beyond(2) is False
+    assert rows["stick_radius"].difference(0) is None
+    assert rows["stick_radius"].difference(2) == 0.0
+
+
+def test_command_writes_text_table_page_and_curves(runs, tmp_path):
+    out = tmp_path / "out"
+    command = ["compare", runs / "ball", runs / "rough", "--out", out]
+    ended = invoke(*command)
+    assert ended.exit_code == 0, ended.stderr
+    (line,) = [line for line in ended.stdout.splitlines() if "friction.coefficient" in line]
+    assert line.split() == ["friction.coefficient", "0.7", "0.9"]
+    assert any(
+        "energy dissipated so far" in text and text.endswith("!")
+        for text in map(str.rstrip, ended.stdout.splitlines())
+    )
+    assert OutputFolder(out, "comparison").manifest.keys() > {"compare.csv", "compare.html"}
+    assert len(list((out / "curves").glob("*.png"))) == 4
+    with (out / "compare.csv").open(encoding="utf-8", newline="") as file:
+        rows = {row["path"]: row for row in csv.DictReader(file)}
+    energy = rows["states.-1.cumulative_energy"]
+    assert energy["unit"] == "N mm"
+    assert float(energy["rough, difference"]) == pytest.approx(
+        float(energy["rough"]) / float(energy["ball"]) - 1.0
+    )
+    assert energy["rough, beyond errors"] == "True"
+    page = Page((out / "compare.html").read_text("utf-8"))
+    assert "script" not in page.tags
+    assert len(page.images) == 4
+    assert "friction.coefficient" in page.told["What differs in their cases"]
+    again = invoke(*command)
+    assert (again.exit_code, "exists; give another folder, or --force" in again.stderr) == (2, True)
+
+
+def test_a_program_compares_as_the_command_does(runs, tmp_path):
+    balls = fretscale.compare(runs / "ball", fretscale.open(runs / "rough"), str(runs / "again"))
+    assert balls.names == ("ball", "rough", "again")
+    assert balls.entries == {"friction.coefficient": ("0.7", "0.9", "0.7")}
+    energy = balls["energy dissipated so far"]
+    first, other, same = energy.values
+    assert (energy.unit, same) == ("N mm", first)
+    assert energy.differences == (None, pytest.approx(other / first - 1.0), 0.0)
+    assert energy.beyond == (None, True, False)
+    assert energy == balls["after the last increment, energy dissipated so far"]
+    with pytest.raises(KeyError, match=r"nothing: not there; allowed: .*energy dissipated so far"):
+        balls["nothing"]
+    ended = invoke("compare", runs / "ball", runs / "rough", runs / "again")
+    assert [line.rstrip() for line in ended.stdout.splitlines()] == repr(balls).splitlines()
+    table = balls.pandas()
+    assert table.loc[(energy.of, energy.name), "rough, difference"] == energy.differences[1]
+    page = balls.report(tmp_path / "compared")
+    assert Page(page.read_text("utf-8")).images
+    assert page.with_name("compare.csv").exists()
+    with pytest.raises(fretscale.UserError, match="exists; give another folder"):
+        balls.report(tmp_path / "compared")
+
+
+def test_values_in_different_units_are_not_beside_each_other(runs, tmp_path):
+    """The forces of a cylinder are per length."""
+    line = BALL.replace("sphere, radius: 10 mm", "cylinder, radius: 10 mm")
+    line = line.replace("[16, 16], size: [1 mm, 1 mm]", "64, size: 1 mm")
+    line = line.replace("400 N", "400 N/mm")
+    (tmp_path / "line.yaml").write_text(line.replace("210 N,", "150 N/mm,"), encoding="utf-8")
+    settings = [part for entry in QUIET for part in ("--set", entry)]
+    ended = invoke("run", tmp_path / "line.yaml", "--out", tmp_path / "line", *settings)
+    assert ended.exit_code == 0, ended.stderr
+    found = [
+        r for r in compare([runs / "ball", tmp_path / "line"]).rows if r.first.path[-2:] == ".P"
+    ]
+    assert [row.first.unit for row in found] == ["N", "N/mm"]
+    assert [[value is None for value in row.values] for row in found] == [
+        [False, True],
+        [True, False],
+    ]
+
+
+def test_what_cannot_be_compared_is_refused_in_a_line(runs, tmp_path):
+    with pytest.raises(UserError, match=r"a run of a joint case.*allowed: bodies, line"):
+        compare([runs / "ball", runs / "joint"])
+    with pytest.raises(UserError, match="two or more folders"):
+        compare([runs / "ball", runs / "." / "ball"])
+    with pytest.raises(UserError, match="two or more folders"):
+        compare([runs / "ball"])
+    with pytest.raises(UserError, match="no run of fretscale here"):
+        compare([runs / "ball", tmp_path])
+
+
+def test_runs_of_one_name_are_told_apart_by_where_they_are(runs, tmp_path):
+    for place in ("one", "two"):
+        (tmp_path / place / "run").mkdir(parents=True)
+        for name in ("case.yaml", "summary.json", "results.h5", "manifest.json"):
+            there = tmp_path / place / "run" / name
+            there.write_bytes((runs / "ball" / name).read_bytes())
+    compared = compare([tmp_path / "one" / "run", tmp_path / "two" / "run"])
+    assert compared.names == ["one/run", "two/run"]
+    assert not compared.entries
+
+
+def test_curves_are_found_by_patterns(tmp_path):
+    """Patterns find any group, the last numbered one, the last column, the middle of a field."""
+    with h5py.File(tmp_path / "results.h5", "w") as file:
+        for force, name in ((10.0, "00000"), (30.0, "00001")):
+            group = file.create_group(f"responses/{name}")
+            group.attrs["force"] = force
+            for number in (2, 10):
+                values = np.column_stack([np.zeros(3), np.full(3, number)])
+                for dataset, unit in (("force", "N"), ("displacement", "mm")):
+                    made = group.create_dataset(f"loops/{number:05d}/{dataset}", data=values)
+                    made.attrs["unit"] = unit
+            group["loops/00010/displacement"].attrs["unit"] = "mm"
+        grid = file.create_group("grid/face")
+        grid.attrs["shape"], grid.attrs["pitch"] = (4, 3), (1.0, 2.0)
+        field = file.create_dataset("contact/face/00007/pressure", data=np.arange(12).reshape(4, 3))
+        field.attrs["unit"] = "MPa"
+        at = "responses/*/loops/-1"
+        loops = CurvesOf("loop", f"{at}/force", f"{at}/displacement", ("N", "mm"))
+        found = list(curves_in(file, loops))
+        assert [curve.title for curve in found] == ["loop, under 10 N", "loop, under 30 N"]
+        assert found[0].y.tolist() == [10.0, 10.0, 10.0]
+        (profile,) = curves_in(
+            file, CurvesOf("p", "grid/*", "contact/*/-1/pressure", ("mm", "MPa"))
+        )
+        assert (profile.title, profile.y.tolist()) == ("p, face", [1, 4, 7, 10])
+        assert profile.x.tolist() == [-1.5, -0.5, 0.5, 1.5]
+        assert list(curves_in(file, CurvesOf("none", "grid/*", "loops/*/-1/force", ("", "")))) == []

@@ -1,0 +1,297 @@
+"""Tests of contact cases from the command line: their files, failures and references."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+from sa_solver.cycles.history import History
+from tests.workflow.command_line import invoke
+from tests.workflow.conftest import manifest_has_all
+from workflow.analyses.contact import run as contact_run
+from workflow.kinds import template
+
+CASES = Path(__file__).parents[3] / "cases"
+QUIET = ["--set", "output.paraview=false", "--set", "output.figures=false"]
+SMALL = """\
+title: Ball
+analysis: contact
+structure: {kind: bodies, shape: sphere, radius: 10 mm}
+materials:
+  body_1: {young: 115 GPa, poisson: 0.29, yield_stress: 900 MPa}
+  body_2: {young: 115 GPa, poisson: 0.29}
+friction: {coefficient: 0.7}
+load_path:
+  legs:
+    - {P: 400 N}
+    - {Qx: 210 N, increments: 3}
+    - {Qx: -210 N, increments: 4}
+    - {Qx: 210 N, increments: 4}
+contact: {grid: [32, 32], size: [1 mm, 1 mm], history: full}
+output: {paraview: false, figures: false}
+"""
+
+
+@pytest.fixture
+def small(tmp_path):
+    path = tmp_path / "small.yaml"
+    path.write_text(SMALL, encoding="utf-8")
+    return path
+
+
+def summary_of(folder):
+    text = (folder / "summary.json").read_text(encoding="utf-8")
+    assert "NaN" not in text
+    assert "Infinity" not in text
+    return json.loads(text)
+
+
+# --- what the run does with what the solver says ------------------------------------------------
+
+
+def states(count, **last):
+    """Return states of an idle contact, the last one with changes."""
+    nothing = {
+        "traction": np.zeros((3, 32, 32)),
+        "slip": np.zeros((2, 32, 32)),
+        "gap": np.zeros((32, 32)),
+        "resultants": np.zeros(6),
+        "rigid": np.zeros(6),
+        "energy": np.zeros(2),
+        "sliding": False,
+        "residual": 1e-9,
+        "converged": True,
+        "message": "",
+        "convolutions": 1,
+        "border_load": 0.0,
+    }
+    return [SimpleNamespace(**(nothing | (last if k == count - 1 else {}))) for k in range(count)]
+
+
+@pytest.fixture
+def solver(monkeypatch):
+    """Replace the solver by one that returns these states."""
+
+    def stand_in(computed):
+        history = History(computed, list(range(len(computed))), "full", "asked for")
+        monkeypatch.setattr(contact_run, "march_history", lambda *given, **settings: history)
+
+    return stand_in
+
+
+def test_increment_that_does_not_converge_ends_the_run_and_keeps_the_others(
+    solver, small, tmp_path
+):
+    solver(states(3, converged=False, message="residual 1e-3 after 300; raise the tolerance"))
+    out = tmp_path / "out"
+    done = invoke("run", small, "--out", out)
+    assert done.exit_code == 3
+    line = done.stderr.splitlines()[-1]
+    assert "increment 3 of 12 did not converge: residual 1e-3 after 300; raise the tol" in line
+    assert str(out / "results.h5") in line
+    with h5py.File(out / "results.h5") as file:
+        assert list(file["history/increment"]) == [1, 2, 3]
+    assert not (out / "summary.json").exists()
+    resumed = invoke("resume", out)
+    assert resumed.exit_code == 2
+    (line,) = resumed.stderr.splitlines()
+    assert f"start it again with `fretscale run {out / 'case.yaml'} --out {out}`" in line
+    # As told; the folder is this case's own.
+    solver(states(12))
+    again = invoke("run", out / "case.yaml", "--out", out)
+    assert again.exit_code == 0, again.stderr
+    assert invoke("resume", out).exit_code == 0
+
+
+def test_border_and_yield_are_warned_of(solver, small, tmp_path):
+    solver(states(12, border_load=0.01, traction=np.full((3, 32, 32), 950.0)))
+    done = invoke("run", small, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.stderr
+    border, pressure = summary_of(tmp_path / "out")["warnings"]
+    assert "touches the border" in border
+    assert "raise contact.size" in border
+    assert "reaches 950 MPa, above the yield stress of 900 MPa" in pressure
+
+
+UNLIKE = """\
+title: Rigid ball on rubber
+analysis: contact
+structure: {kind: bodies, shape: sphere, radius: 10 mm}
+materials: {body_1: rigid, body_2: {young: 115 GPa, poisson: 0}}
+friction: {coefficient: 0.5}
+load_path: {legs: [{P: 400 N}]}
+contact: {grid: [32, 32], size: [0.8 mm, 0.8 mm]}
+output: {paraview: false, figures: false}
+"""
+
+
+def test_unlike_bodies_pressed_in_one_increment_are_followed_or_warned_of(tmp_path):
+    path = tmp_path / "unlike.yaml"
+    path.write_text(UNLIKE, encoding="utf-8")
+    summaries = []
+    for history in ("auto", "full"):
+        out = tmp_path / history
+        done = invoke("run", path, "--out", out, "--set", f"contact.history={history}")
+        assert done.exit_code == 0, done.stderr
+        summaries.append(summary_of(out))
+    split, given = summaries
+    assert split["warnings"] == []
+    assert split["history"]["parts"] > 4
+    assert split["history"]["error"] <= 0.02
+    # Passes that were too coarse count too, though their states are not kept.
+    kept = [sum(state["convolutions"] for state in found["states"]) for found in summaries]
+    assert split["convolutions"] > 1.2 * kept[0]
+    logged = re.findall(r"(\d+) convolutions", (tmp_path / "auto" / "run.log").read_text())
+    assert split["convolutions"] == sum(map(int, logged[:-1])) == int(logged[-1])
+    assert given["convolutions"] > kept[1]
+    assert "shear within" in done.output
+    radii = [found["states"][0]["stick_radius"] for found in summaries]
+    assert radii[1] < 0.7 * radii[0]
+    (warning,) = given["warnings"]
+    assert "increment 1, above contact.accuracy of 2.0%" in warning
+    assert "contact.history: auto" in warning
+    assert "load_path.legs.0.increments" in warning
+
+
+def test_too_many_cells_are_refused_before_anything_is_done(monkeypatch, small, tmp_path):
+    from workflow.shell import memory
+
+    monkeypatch.setattr(memory, "_available_bytes", lambda: 2e9)
+    done = invoke("run", small, "--out", tmp_path / "out", "--set", "contact.grid=[4096, 4096]")
+    assert done.exit_code == 4
+    (line,) = done.stderr.splitlines()
+    assert "lower contact.grid" in line
+    assert not (tmp_path / "out").exists()
+
+
+# --- runs ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Return a run of the small case with every file, which tests must not change."""
+    folder = tmp_path_factory.mktemp("whole")
+    path = folder / "small.yaml"
+    path.write_text(SMALL, encoding="utf-8")
+    pictures = ["--set", "output.paraview=true", "--set", "output.figures=true"]
+    done = invoke("run", path, "--out", folder / "out", *pictures)
+    assert done.exit_code == 0, done.stderr
+    return folder / "out"
+
+
+def test_folder_holds_what_it_promises(whole):
+    names = {path.name for path in whole.iterdir()}
+    assert names == {
+        *("case.yaml", "summary.json", "results.h5", "run.log", "paraview", "figures"),
+        *("manifest.json", "report.html"),
+    }
+    assert manifest_has_all(whole)
+    assert {path.stem for path in (whole / "figures").iterdir()} == {"profiles", "maps", "forces"}
+    assert len(list((whole / "paraview" / "contact").iterdir())) == 12
+
+
+def test_summary_has_states_and_the_loop(whole):
+    summary = summary_of(whole)
+    assert [state["increment"] for state in summary["states"]] == list(range(1, 13))
+    assert summary["history"]["method"] == "full"
+    for state in summary["states"]:
+        assert state["P"] == pytest.approx(400.0, rel=1e-6)
+        assert state["residual"] <= 1e-8
+        assert state["energy"] >= -1e-9
+    loop = summary["loop"]
+    assert (loop["from_increment"], loop["to_increment"]) == (4, 12)
+    # Eight steps around the loop: the trapezoids' area to a few per cent.
+    assert loop["area"] == pytest.approx(loop["energy"], rel=0.1)
+    assert any("yield" in warning for warning in summary["warnings"])
+
+
+def test_path_from_a_file_is_the_same_run(whole, small, tmp_path):
+    forces = [0, 70, 140, 210, 105, 0, -105, -210, -105, 0, 105, 210]
+    rows = "".join(f"400,{force}\n" for force in forces)
+    (tmp_path / "history.csv").write_text(f"P,Qx\n{rows}", encoding="utf-8")
+    done = invoke("run", small, "--out", tmp_path / "out", "--set", "load_path={file: history.csv}")
+    assert done.exit_code == 0, done.stderr
+    assert summary_of(tmp_path / "out")["states"] == summary_of(whole)["states"]
+
+
+def test_heights_from_a_file_are_the_same_run(whole, small, tmp_path):
+    with h5py.File(whole / "results.h5") as file:
+        np.save(tmp_path / "gap.npy", file["surfaces/bodies/height"][()])
+    shape = "structure={kind: bodies, shape: heights, file: gap.npy}"
+    done = invoke("run", small, "--out", tmp_path / "out", "--set", shape)
+    assert done.exit_code == 0, done.stderr
+    assert summary_of(tmp_path / "out")["states"] == summary_of(whole)["states"]
+
+
+def test_small_grid_is_warned_of(whole, small, tmp_path):
+    done = invoke(
+        *("run", small, "--out", tmp_path / "out"),
+        *("--set", "contact.size=[0.6 mm, 0.6 mm]", "--set", "load_path.legs=[{P: 400 N}]"),
+    )
+    assert done.exit_code == 0, done.stderr
+    assert any("touches the border" in told for told in summary_of(tmp_path / "out")["warnings"])
+
+
+def test_force_that_no_friction_can_carry_is_told_in_a_line(whole, small, tmp_path):
+    done = invoke(
+        *("run", small, "--out", tmp_path / "out"),
+        *("--set", "load_path.legs=[{P: 400 N}, {Qx: 300 N}]"),
+    )
+    assert done.exit_code == 3
+    assert "Traceback" not in done.stderr
+    line = done.stderr.splitlines()[-1]
+    assert "after increment 1 of 2: " in line
+    assert str(tmp_path / "out" / "results.h5") in line
+
+
+def test_history_that_does_not_suit_the_path_is_a_bad_case(whole, small, tmp_path):
+    legs = "load_path.legs=[{P: 400 N}, {P: 500 N, Qx: 100 N}, {P: 300 N}]"
+    done = invoke(
+        *("run", small, "--out", tmp_path / "out"),
+        *("--set", legs, "--set", "contact.history=reversals"),
+    )
+    assert done.exit_code == 2
+    assert "contact.history: " in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("kind", ["bodies", "line"])
+def test_template_runs(whole, kind, tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text(template(kind), encoding="utf-8")
+    grid = "contact.grid=[32, 32]" if kind == "bodies" else "contact.grid=64"
+    done = invoke("run", path, "--out", tmp_path / "out", *QUIET, "--set", grid)
+    assert done.exit_code == 0, done.stderr
+
+
+def test_contact_needs_no_finite_elements(whole, small, tmp_path):
+    code = f"""
+import sys
+from pathlib import Path
+from workflow.kinds import load_case
+from workflow.runs.run import run_case
+run_case(load_case({str(small)!r}), Path({str(tmp_path / "out")!r}), False)
+assert not {{"gmsh", "skfem", "meshio"}} & set(sys.modules)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+# --- shipped cases ------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    ["sphere_normal", "sphere_fretting", "sphere_torsion", "line_bulk_stress", "line_dissimilar"],
+)
+def test_shipped_case_meets_its_expectations(whole, name, tmp_path):
+    text = (CASES / f"{name}.yaml").read_text(encoding="utf-8")
+    path = tmp_path / f"{name}.yaml"
+    path.write_text(f"{text}\noutput: {{paraview: false, figures: false}}\n", encoding="utf-8")
+    done = invoke("verify", path, "--out", tmp_path / "out")
+    assert done.exit_code == 0, (done.stdout, done.stderr)

@@ -1,0 +1,313 @@
+"""Tests of ``import fretscale``: cases from dictionaries, runs, and results as arrays."""
+
+import os
+import shutil
+from pathlib import Path
+
+import fretscale
+import numpy as np
+import pytest
+
+from tests.conftest import CASES
+from tests.workflow.shell.interruptions import ctrl_c_after_jumps
+
+SPHERE = CASES / "sphere_normal.yaml"
+SMALL = {"contact__grid": [32, 32], "output__paraview": False, "output__figures": False}
+# A ball that is pressed, and pushed back and forth.
+BALL = {
+    "title": "Ball on a flat",
+    "analysis": "contact",
+    "structure": {"kind": "bodies", "shape": "sphere", "radius": "10 mm"},
+    "materials": {
+        "body_1": {"young": "115 GPa", "poisson": 0.29},
+        "body_2": {"young": 115e3, "poisson": np.float64(0.29)},
+    },
+    "friction": {"coefficient": 0.7},
+    "load_path": {"legs": [{"P": "400 N"}, {"Qx": 200}, {"Qx": -200.0}]},
+    "contact": {"grid": np.array([32, 32]), "size": ("1 mm", "1 mm")},
+    "output": {"paraview": False, "figures": False},
+}
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory):
+    return fretscale.run(BALL, tmp_path_factory.mktemp("ball") / "out", quiet=True)
+
+
+# --- cases ----------------------------------------------------------------------------------------
+
+
+def test_a_dictionary_says_what_a_file_says():
+    from workflow.case.source import Source
+
+    text = SPHERE.read_text("utf-8")
+    assert fretscale.load_case(Source(str(SPHERE), text).data) == fretscale.load_case(SPHERE)
+
+
+def test_files_of_a_dictionary_are_looked_for_from_the_current_folder(tmp_path, monkeypatch):
+    legs = "P [N]\n400\n"
+    monkeypatch.chdir(tmp_path)
+    case = BALL | {"load_path": {"file": Path("legs.csv")}}
+    with pytest.raises(fretscale.CaseError, match=r"^the case: load_path\.file: 'legs.csv': no "):
+        fretscale.load_case(case)
+    Path("legs.csv").write_text(legs, encoding="utf-8")
+    assert fretscale.load_case(case).load_path.file == str(tmp_path / "legs.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("wear.cycles", "many"),
+        ("wear.cycles", float("nan")),
+        ("wear.cycles", None),
+        ("friction.coefficient", -1),
+        ("contact.grid", [64, "x"]),
+        ("contact.grd", 3),
+        ("contact", {"grid": 3}),
+        ("load_path.increments", True),
+    ],
+)
+def test_a_wrong_override_is_told_as_on_the_command_line(name, value, dovetail_path):
+    import json
+
+    from workflow.kinds import load_case
+
+    text = value if isinstance(value, str) else json.dumps(value)
+    with pytest.raises(fretscale.CaseError) as there:
+        load_case(dovetail_path, [f"{name}={text}"])
+    with pytest.raises(fretscale.CaseError) as here:
+        fretscale.load_case(dovetail_path, **{name.replace(".", "__"): value})
+    assert str(here.value) == str(there.value)
+    with pytest.raises(fretscale.CaseError) as dotted:
+        fretscale.load_case(dovetail_path, **{name: value})
+    assert str(dotted.value) == str(there.value)
+
+
+@pytest.mark.parametrize(
+    ("case", "told"),
+    [
+        ({}, "the case: analysis: missing; allowed: wear, "),
+        (None, "the case: of type NoneType; allowed: the path of a file, a dictionary, a case"),
+        ([BALL], "the case: of type list"),
+        (fretscale.load_case(SPHERE).friction, "the case: of type Friction; allowed: the path"),
+        (BALL | {"title": object()}, "the case: title: of type object; allowed: number, text"),
+        (BALL | {"friction": 0.3}, "the case: friction: 0.3: not a section"),
+        (BALL | {"frction": {}}, "the case: frction: unknown key; did you mean 'friction'?"),
+        ("no.yaml", "no.yaml: no such file"),
+    ],
+)
+def test_a_wrong_case_is_one_line(case, told):
+    with pytest.raises(fretscale.CaseError) as error:
+        fretscale.load_case(case)
+    assert str(error.value).startswith(told)
+    assert "\n" not in str(error.value)
+
+
+def test_overrides_change_a_loaded_case():
+    case = fretscale.load_case(SPHERE)
+    assert fretscale.load_case(case) is case
+    changed = fretscale.load_case(
+        case, friction__coefficient="60 %", **{"load_path.legs.0.P": "1 kN"}
+    )
+    assert changed.friction.coefficient == 0.6
+    assert changed.load_path.legs[0].P == 1000.0
+
+
+def test_a_check_says_what_the_command_says(monkeypatch):
+    checked = fretscale.check(SPHERE, contact__grid=[64, 64])
+    assert "64 x 64 cells" in dict(checked.outline)["contact"]
+    assert "64 x 64 cells" in str(checked)
+    assert checked.memory > 1e9
+    doubted = fretscale.check(SPHERE, materials__body_1__young="210 MPa")
+    assert "210 MPa" in doubted.doubts[0]
+    assert f"doubt: {doubted.doubts[0]}" in str(doubted)
+    monkeypatch.setattr("workflow.shell.memory._available_bytes", lambda: 1e9)
+    with pytest.raises(fretscale.OutOfMemory, match=r"1\.0 GB are free"):
+        fretscale.check(SPHERE)
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+def test_a_run_is_found_again(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    first = fretscale.run(SPHERE, **SMALL)
+    assert "run: Sphere" in capfd.readouterr().err
+    assert first.folder.parent == tmp_path / "out"
+    assert first.folder.name.startswith("sphere_normal-")
+    written = first.folder.joinpath("results.h5").stat().st_mtime_ns
+    again = fretscale.run(SPHERE, quiet=True, **SMALL)
+    assert again.folder == first.folder
+    assert again.folder.joinpath("results.h5").stat().st_mtime_ns == written
+    other = fretscale.run(SPHERE, quiet=True, **SMALL | {"friction__coefficient": 0.1})
+    assert other.folder != first.folder
+    assert not capfd.readouterr().err
+
+
+def test_another_case_is_in_the_way(ball, tmp_path):
+    folder = shutil.copytree(ball.folder, tmp_path / "out")
+    with pytest.raises(fretscale.UserError, match="holds the results of another case"):
+        fretscale.run(BALL, folder, friction__coefficient=0.1)
+    forced = fretscale.run(BALL, folder, force=True, quiet=True, friction__coefficient=0.8)
+    assert forced.case.friction.coefficient == 0.8
+
+
+@pytest.mark.slow
+def test_an_interrupted_run_goes_on(tmp_path):
+    case = fretscale.load_case(CASES / "sphere_wear.yaml", **SMALL, error_budget="known")
+    with ctrl_c_after_jumps(1), pytest.raises(KeyboardInterrupt):
+        fretscale.run(case, tmp_path / "out", quiet=True)
+    with pytest.raises(fretscale.UserError, match="not finished; go on with"):
+        fretscale.open(tmp_path / "out")
+    results = fretscale.run(case, tmp_path / "out", quiet=True)
+    assert "resume" in results.folder.joinpath("run.log").read_text("utf-8")
+
+
+# --- results --------------------------------------------------------------------------------------
+
+
+def labelled(group):
+    """Return all datasets of a group, after checking their axes against their labels."""
+    for item in group.values():
+        if isinstance(item, fretscale.Group):
+            yield from labelled(item)
+            continue
+        along = item.coordinates
+        assert along.keys() == set(filter(None, item.dims)), item
+        for dim, length in zip(item.dims, item.shape, strict=True):
+            assert not dim or along[dim].shape == (length,), item
+        yield item
+
+
+def test_results_say_what_they_are(ball):
+    assert ball.title == "Ball on a flat"
+    assert ball.case == fretscale.load_case(BALL)
+    assert ball.summary["title"] == ball.title
+    assert ball.warnings == ball.summary["warnings"]
+    assert "digests" not in ball.summary
+    pressure = ball["contact/bodies/00003/pressure"]
+    assert (pressure.unit, pressure.description) == ("MPa", "contact pressure")
+    assert pressure.dims == ("x", "y")
+    assert "pressure (x 32, y 32) [MPa]: contact pressure" in ball.tree()
+    assert "contact" in repr(ball)
+    assert "Ball on a flat" in ball._repr_html_()
+    assert ball["contact"]["bodies"].attributes == {}
+    assert ball["contact/bodies/00003"].attributes == {"increment": 3}
+    with pytest.raises(KeyError, match=r"contcat: not there; the results: case, contact"):
+        ball["contcat"]
+
+
+def test_main_results_have_units_and_errors(ball, tmp_path):
+    pressure = next(result for result in ball.main if "pressure" in result.name)
+    assert pressure.unit == "MPa"
+    states = ball.summary["states"]
+    assert pressure.value == pytest.approx(states[-1]["peak_pressure"], rel=1e-12)
+    page = ball.report(tmp_path / "for_others.html")
+    assert ball.title in page.read_text(encoding="utf-8")
+
+
+def test_values_are_arrays(ball):
+    pressure = ball["contact/bodies/00001/pressure"]
+    x, y = pressure.coordinates["x"], pressure.coordinates["y"]
+    assert x.unit == "mm"
+    cell = float((x[1] - x[0]) * (y[1] - y[0]))
+    assert np.sum(pressure) * cell == pytest.approx(400.0, rel=1e-6)
+    assert (pressure[10:12, 3] == pressure.values[10:12, 3]).all()
+    assert isinstance(2.0 * pressure, np.ndarray)
+    assert np.asarray(pressure, dtype=np.float32).dtype == np.float32
+    assert len(list(pressure)) == len(pressure) == 32
+
+
+def test_every_axis_is_along_what_it_says(ball):
+    labels = {dim for item in labelled(ball) for dim in item.dims}
+    assert labels == {"", "x", "y", "increment"}
+
+
+@pytest.mark.slow
+def test_every_axis_of_a_wear_run_is_along_what_it_says(whole):
+    results = fretscale.open(whole.folder)
+    labels = {dim for item in labelled(results) for dim in item.dims}
+    assert labels == {"", "x", "y", "cycles"}
+    jumps = results["surfaces/intrados"].xarray()
+    assert jumps["body_1"].dims == ("cycles", "x", "y")
+    assert list(jumps["cycles"].values) == list(results["kinetics/cycles"])
+    new = results["surfaces/intrados/00000/body_1"]
+    assert (jumps.body_1.sel(cycles=0.0).values == new.values).all()
+
+
+def test_xarray_has_units_and_coordinates(ball):
+    shear = ball["contact/bodies/00003/shear"].xarray()
+    assert shear.dims == ("shear_0", "x", "y")
+    assert shear.attrs["units"] == "MPa"
+    assert shear.coords["x"].attrs["units"] == "mm"
+    states = ball["contact/bodies"].xarray()
+    assert states.pressure.dims == ("increment", "x", "y")
+    assert list(states.increment) == [1, 2, 3]
+    turned = states.shear.sel(increment=3)
+    assert (turned.values == ball["contact/bodies/00003/shear"].values).all()
+
+
+def test_pandas_has_units_and_an_index(ball):
+    table = ball["history"].pandas()
+    assert table.index.name == "increment"
+    assert list(table["P [N]"]) == pytest.approx([400.0] * 3)
+    curve = ball["history/Qx"].pandas()
+    assert curve.name == "Qx [N]"
+    assert curve.loc[2] == pytest.approx(200.0)
+    with pytest.raises(fretscale.UserError, match="of 2 axes; allowed: curves"):
+        ball["contact/bodies/00003/pressure"].pandas()
+    with pytest.raises(fretscale.UserError, match="contact/bodies/00003: no table; allowed: "):
+        ball["contact/bodies/00003"].pandas()
+    assert list(ball["contact/bodies"].pandas().index) == [1, 2, 3]
+
+
+def test_folders_without_whole_results_are_refused(ball, tmp_path):
+    with pytest.raises(fretscale.UserError, match="no run of fretscale here"):
+        fretscale.open(tmp_path)
+    folder = shutil.copytree(ball.folder, tmp_path / "out")
+    with Path(folder, "results.h5").open("r+b") as file:
+        file.seek(2000)
+        file.write(b"x")
+    with pytest.raises(fretscale.UserError, match=r"results.h5: not as the run in .* had it"):
+        fretscale.open(folder)
+    Path(folder, "summary.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(fretscale.UserError, match=r"summary\.json: damaged"):
+        fretscale.open(folder)
+    Path(folder, "summary.json").unlink()
+    with pytest.raises(fretscale.UserError, match="this run is not finished; start it again"):
+        fretscale.open(folder)
+
+
+def test_results_that_another_run_has_replaced_are_not_read(ball, tmp_path):
+    folder = shutil.copytree(ball.folder, tmp_path / "out")
+    results = fretscale.open(folder)
+    pressure = results["contact/bodies/00001/pressure"]
+    os.utime(folder / "results.h5", ns=(1, 1))
+    with pytest.raises(fretscale.UserError, match="replaced or removed since it was opened"):
+        _ = pressure.values
+
+
+def test_results_may_lie_without_the_files_that_they_came_from(ball, tmp_path, monkeypatch):
+    """A colleague has the folder, but not the files that its case names."""
+    folder = shutil.copytree(ball.folder, tmp_path / "out")
+    from workflow.shell.folders.folder import OutputFolder
+
+    kept = OutputFolder.read_summary
+    gone = {"/no/such/loads.csv": "0" * 64}
+    monkeypatch.setattr(
+        OutputFolder,
+        "read_summary",
+        lambda self: (s := kept(self)) | {"digests": s["digests"] | gone},
+    )
+    assert fretscale.open(folder).title == ball.title
+
+
+def test_main_results_print_as_a_table(ball):
+    lines = str(ball.main).splitlines()
+    rows = [line for line in lines if line.startswith("  ")]
+    assert len(rows) == len(ball.main)
+    for row, result in zip(rows, ball.main, strict=True):
+        assert row.split("  ")[1].strip() == result.name
+    # Values begin in one column.
+    (load,) = (row for row in rows if "normal force" in row)
+    assert load.endswith("400 N")

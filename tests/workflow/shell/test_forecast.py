@@ -1,0 +1,317 @@
+"""Tests of run-time forecasts: after the first steps of a run, and by a check before it."""
+
+import json
+import re
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.marks import slow
+from tests.workflow.command_line import command
+from workflow.analyses.wear.run_time import ExpectedSteps, steps_of
+from workflow.analyses.wear.structures import structure_of
+from workflow.interface.cases import check
+from workflow.kinds import analysis_of, load_case
+from workflow.shell.forecast import FEW, Forecast, about, in_words
+from workflow.shell.run_time import RunTime
+from workflow.shell.terminal.reporter import Reporter
+
+CASES = Path("cases")
+
+
+class Clock:
+    """Clock whose time the test sets."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    told = Clock()
+    monkeypatch.setattr("time.perf_counter", told)
+    monkeypatch.setattr(Forecast.__init__, "__defaults__", (told,))
+    return told
+
+
+def test_what_is_left_takes_what_its_share_tells(clock: Clock) -> None:
+    forecast = Forecast()
+    assert forecast.left is None
+    clock.now += 18.0
+    forecast.reach(1.0 / 40.0)
+    assert forecast.left == pytest.approx(39 * 18.0)
+    forecast.reach(1.0)
+    assert forecast.left == 0.0
+
+
+def test_what_an_earlier_run_left_tells_nothing_of_the_rest(clock: Clock) -> None:
+    """After three quarters at once and a tenth in 10 s, the last 15 % take 15 s."""
+    forecast = Forecast()
+    forecast.reach(0.75)
+    forecast.go_on()
+    assert forecast.left is None
+    clock.now += 10.0
+    forecast.reach(0.85)
+    assert forecast.left == pytest.approx(15.0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [
+        (0.0, "a few seconds"),
+        (6.0, "5 s"),
+        (17.0, "20 s"),
+        (59.0, "1 min"),
+        (12.4 * 60.0, "12 min"),
+        (48.0 * 60.0, "50 min"),
+        (3590.0, "1 h"),
+        (26.0 * 3600.0, "25 h"),
+        (60.0 * 3600.0, "2 days"),
+    ],
+)
+def test_times_are_told_as_roughly_as_they_are_known(seconds: float, told: str) -> None:
+    assert in_words(seconds) == told
+    assert about(seconds) == (told if told == FEW else f"about {told}")
+
+
+def test_a_forecast_is_told_once_and_again_where_it_changes(clock: Clock, tmp_path: Path) -> None:
+    """Of ten steps of 60 s the seventh takes ten times as long; the first does not count."""
+    reporter = Reporter(tmp_path / "log", expected=RunTime(after=30.0))
+    with reporter.course("wear"):
+        for step in range(1, 11):
+            clock.now += 600.0 if step == 7 else 60.0
+            reporter.reached(step / 10.0, f"step {step}")
+    told = [line[9:] for line in (tmp_path / "log").read_text().splitlines()]
+    # 9 steps of 60 s and 30 s; after the seventh 3 of 150 s and 30 s, 1440 s in place of 630.
+    assert told == [
+        "wear, step 1: about 10 min to go",
+        "wear, step 7: about 8 min to go",
+    ]
+
+
+def test_short_runs_are_not_forecast(clock: Clock, tmp_path: Path) -> None:
+    reporter = Reporter(tmp_path / "log")
+    with reporter.course("wear"):
+        for share in (0.2, 0.4):
+            clock.now += 1.5
+            reporter.reached(share)
+    assert (tmp_path / "log").read_text() == ""
+
+
+def test_a_first_step_may_be_loading(clock: Clock, tmp_path: Path) -> None:
+    """6 s of compiling do not make an hour of 1000 steps of 0.06 s."""
+    reporter = Reporter(tmp_path / "log")
+    with reporter.course("motions"):
+        for step in range(1, 200):
+            clock.now += 6.0 if step == 1 else 0.0625
+            reporter.reached(step / 1000.0, f"step {step}")
+    told = (tmp_path / "log").read_text()[9:]
+    assert told == "motions, step 17: about 1 min to go\n"
+
+
+@pytest.mark.parametrize(("rate", "told"), [(1e-5, "3 min"), (5e-2, "40 s")])
+def test_of_little_work_it_is_told_what_was_expected(
+    clock: Clock, tmp_path: Path, rate: float, told: str
+) -> None:
+    """200 s are expected: 2e-5 of the work in 2 s (28 h) counts little, a tenth in 20 s a lot."""
+    reporter = Reporter(tmp_path / "log", expected=RunTime(course=200.0, after=0.0))
+    with reporter.course("motions"):
+        for step in (1, 2, 3):
+            clock.now += 1.0
+            reporter.reached(rate * step)
+    lines = (tmp_path / "log").read_text().splitlines()
+    assert lines[0][9:] == f"motions: about {told} to go", lines
+
+
+def test_what_comes_after_is_as_slow_as_what_came_before(clock: Clock, tmp_path: Path) -> None:
+    """The start takes 40 s instead of 7 + 3 s, so the end takes 20 + 80 s, not 20 s."""
+    reporter = Reporter(tmp_path / "log", expected=RunTime(before=7.0, after=20.0))
+    clock.now += 40.0
+    with reporter.course("wear"):
+        for step in (1, 2):
+            clock.now += 20.0
+            reporter.reached(step / 2.0)
+    assert (tmp_path / "log").read_text()[9:] == "wear: about 2 min to go\n"
+
+
+def test_parts_share_the_work_of_what_is_around_them(clock: Clock, tmp_path: Path) -> None:
+    """The first halves of two forces with two parts advance from 1/8 to 5/8 in 100 s."""
+    reporter = Reporter(tmp_path / "log")
+    with reporter.course("curves"):
+        for force in reporter.parts((10.0, 30.0), "{:g} N".format):
+            with reporter.part(0.0, 0.5, "wear"):
+                clock.now += 5.0 * force - 50.0
+                reporter.reached(0.5, "95 Hz")
+    told = (tmp_path / "log").read_text()
+    assert "curves, 30 N: wear: 95 Hz: about 1 min to go" in told
+
+
+# --- the loops of every analysis ------------------------------------------------------------------
+
+
+@pytest.fixture
+def every_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make forecasts for runs of any length, from their first step on."""
+    for least in ("FIRST_WORK", "FIRST_STEP", "SHORT_RUN"):
+        monkeypatch.setattr(f"workflow.shell.terminal.reporter.{least}", 0.0)
+
+
+SHORT = ["output.figures=false", "output.paraview=false"]
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "told"),
+    [
+        ("cylinder_wear.yaml", ["wear.cycles=1.2e5"], r"wear, jump 1 of about 3, 4e\+04 cycles"),
+        slow("sphere_normal.yaml", [], r"contact, increment \d+ of \d+"),
+        slow("rig_force_75N.yaml", ["energies=[0 J]"], r"steady states, 0 J: period \d+"),
+        slow("rig_hammer_7N.yaml", ["energies=[0 J]"], r"motions, 0 J"),
+        slow("rig_two_dof.yaml", ["forces=[1 N]"], r"vibration, 1 N: [\d.]+ Hz"),
+        slow("specimens_coarse.yaml", [], r"specimens, [\d.]+ N"),
+    ],
+)
+def test_runs_of_every_kind_tell_how_far_they_are(
+    every_step: None, tmp_path: Path, name: str, settings: list[str], told: str
+) -> None:
+    out = tmp_path / "out"
+    settings = [*settings, *(SHORT if "paraview" in (CASES / name).read_text() else SHORT[:1])]
+    done = command("run", CASES / name, "--out", out, overrides=settings)
+    assert done.exit_code == 0, done.stderr
+    assert re.search(rf"{told}: (about [\d.]+ \w+|a few seconds) to go", done.stderr)
+
+
+# --- before it begins -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "true"),
+    [
+        ("bolted_joint_test2", 4),
+        ("cylinder_wear", 8),
+        ("dovetail", 60),
+        ("dovetail_2d", 15),
+        ("dovetail_small", 12),
+        ("line_dissimilar", 14),
+        ("rig_computed_wear", 51),
+        ("rig_force_75N", 9),
+        ("rig_hammer_60N", 15),
+        ("rig_harmonic_balance", 400),
+        ("rig_reduced", 18),
+        ("rig_two_dof", 50),
+        ("ring_of_blades", 8),
+        ("rig_wear_specimens", 170),
+        ("rig_wear_vibration", 62),
+        ("specimens_rig", 28),
+        ("specimens_wear", 27),
+        ("sphere_fretting", 6),
+        ("sphere_wear", 10),
+    ],
+)
+def test_check_tells_the_order_of_magnitude(name: str, true: float) -> None:
+    """The reference is processor seconds of shipped cases on one core, with an empty cache."""
+    case = load_case(CASES / f"{name}.yaml")
+    told = analysis_of(case).run_time(case).seconds
+    assert true / 5.0 < told < 5.0 * true
+
+
+@pytest.mark.parametrize(
+    ("name", "finer"),
+    [
+        ("dovetail", "mesh.flank_nodes=[40, 68]"),
+        ("dovetail", "wear.step.cycles=2000"),
+        ("dovetail", "contact.grid=[512, 1024]"),
+        ("cylinder_wear", "wear.step.cycles=100"),
+        ("sphere_fretting", "contact.grid=[512, 512]"),
+        ("rig_hammer_60N", "integration.step=1 us"),
+        ("rig_harmonic_balance", "resolution.harmonics=15"),
+        ("rig_wear_specimens", "wear.cycles=[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14]"),
+        ("specimens_rig", "mesh.size=0.3 mm"),
+    ],
+)
+def test_more_work_takes_longer(name: str, finer: str) -> None:
+    path = CASES / f"{name}.yaml"
+    case, more = load_case(path), load_case(path, [finer])
+    times = [analysis_of(each).run_time(each).seconds for each in (case, more)]
+    assert times[1] > 2.0 * times[0]
+
+
+NO_PICTURES = "output={figures: false, paraview: false, report: false}"
+
+
+def steps_expected(case: Any) -> ExpectedSteps:
+    return steps_of(case, structure_of(case).extent(case))
+
+
+@pytest.mark.parametrize(("cycles", "tolerance"), [(1e5, "1 %"), (1e5, "0.1 %"), (1e7, "1 %")])
+def test_jumps_on_given_slips_are_counted(cycles: float, tolerance: str, tmp_path: Path) -> None:
+    """The estimated number of automatic jumps is within a factor of three of the run's."""
+    path, out = CASES / "cylinder_wear.yaml", tmp_path / "out"
+    changes = ["wear.step={kind: implicit}", f"wear.cycles={cycles}", f"wear.tolerance={tolerance}"]
+    expected = steps_expected(load_case(path, changes))
+    changes += [NO_PICTURES, "error_budget=known"]
+    done = command("run", path, "--out", out, overrides=changes)
+    assert done.exit_code == 0, done.stderr
+    jumps = json.loads((out / "summary.json").read_text("utf-8"))["jumps"]
+    assert not expected.unknown
+    assert jumps / 3.0 < expected.jumps < 3.0 * jumps
+
+
+@pytest.mark.parametrize(
+    ("settings", "jumps"),
+    [
+        (["wear.step.cycles=500", "wear.cycles=1e5"], 200),
+        (["wear.step={kind: implicit, depth: 2 um}", "wear.stop.depth=0.1 mm"], 50),
+        (["wear.step={kind: implicit, volume: 1 mm^3}", "wear.stop.volume=8 mm^3"], 8),
+    ],
+)
+def test_jumps_that_settings_tell_are_counted(settings: list[str], jumps: int) -> None:
+    expected = steps_expected(load_case(CASES / "cylinder_wear.yaml", settings))
+    assert (expected.jumps, expected.unknown) == (jumps, "")
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("specimens_wear", []),
+        ("cylinder_wear", ["wear.step={kind: implicit}", "contact.method=full"]),
+        ("cylinder_wear", ["wear.step={kind: implicit, depth: 2 um}"]),
+        ("cylinder_wear", ["wear.step={kind: implicit, depth: 2 um}", "wear.stop.volume=8 mm^3"]),
+    ],
+)
+def test_jumps_that_nobody_can_count_are_said_to_be_unknown(name: str, settings: list[str]) -> None:
+    """The time is given for a certain number of jumps, which is reported with it."""
+    path = CASES / f"{name}.yaml"
+    case = load_case(path, settings)
+    expected = steps_expected(case)
+    assert expected.unknown
+    told = analysis_of(case).run_time(case)
+    assert told.unknown == expected.unknown
+    assert str(ceil(expected.jumps)) in told.assumed
+    printed = str(check(path, **dict(s.replace(".", "__").split("=", 1) for s in settings)))
+    for lines in (command("check", path, overrides=settings).stdout, printed):
+        (line,) = re.findall(r"^  time +(.*)$", lines, re.MULTILINE)
+        assert line == told.text
+        assert told.assumed in line
+        assert told.unknown in line
+
+
+def test_a_rig_does_not_know_more_than_the_wear_that_it_waits_for() -> None:
+    rig, specimens = (
+        load_case(CASES / f"{n}.yaml") for n in ("rig_computed_wear", "specimens_wear")
+    )
+    waits, waited = (analysis_of(case).run_time(case) for case in (rig, specimens))
+    assert waited.unknown
+    assert (waits.assumed, waits.unknown) == (waited.assumed, waited.unknown)
+    assert waits.before >= waited.seconds
+
+
+def test_check_says_how_long() -> None:
+    checked = command("check", CASES / "dovetail.yaml")
+    assert re.search(
+        r"^  time +about 1 min, within a factor of five$", checked.stdout, re.MULTILINE
+    )

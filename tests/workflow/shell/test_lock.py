@@ -1,0 +1,209 @@
+"""Tests of two processes in one folder: the holder is named, and an abandoned lock is taken."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.workflow.command_line import invoke
+from tests.workflow.scenes import BALL
+from workflow.errors import UserError
+from workflow.kinds import load_case
+from workflow.runs import run as running
+from workflow.runs.run import bring_to_end
+from workflow.shell.folders import lock
+from workflow.shell.folders.lock import LOCK, locked
+
+# Seconds within which another process has begun or ended.
+PATIENCE = 120.0
+HOLD = """
+import sys, time
+from pathlib import Path
+from workflow.shell.folders.lock import locked
+with locked(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(600)
+"""
+
+posix_only = pytest.mark.skipif(os.name != "posix", reason="locks of POSIX")
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "out"
+
+
+@pytest.fixture
+def holder(out):
+    """Start another process that holds the folder."""
+    command = [sys.executable, "-c", HOLD, str(out)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "held\n"
+        yield process
+        process.kill()
+
+
+@pytest.fixture
+def ball(tmp_path):
+    path = tmp_path / "ball.yaml"
+    path.write_text(f"{BALL}output: {{paraview: false, figures: false}}\n", encoding="utf-8")
+    return path
+
+
+def left_by(out, host, process=1):
+    """Write the lock of a process that has ended, with the number of a running one."""
+    out.mkdir(exist_ok=True)
+    told = {"process": process, "host": host, "since": "2026-01-02 03:04:05"}
+    (out / LOCK).write_text(json.dumps(told))
+
+
+def killed(process):
+    process.send_signal(signal.SIGKILL)
+    process.wait(PATIENCE)
+
+
+@posix_only
+@pytest.mark.parametrize("command", ["run", "resume", "sweep", "chart", "loops"])
+def test_a_second_command_is_one_line_that_names_the_first(out, holder, ball, tmp_path, command):
+    (tmp_path / "sweep.yaml").write_text(
+        "case: ball.yaml\ndesign: grid\nvary: {friction.coefficient: {values: [0.7, 0.8]}}\n"
+    )
+    turns = np.arange(400) / 100.0 * 2.0 * np.pi
+    rows = "".join(f"{np.sin(turn)},{np.sin(turn + 0.5)}\n" for turn in turns)
+    (tmp_path / "loops.csv").write_text(f"displacement [um],force [N]\n{rows}")
+    if command == "resume":
+        (out / "case.yaml").write_text(ball.read_text())
+    arguments = {
+        "run": ["run", ball, "--out", out, "--force"],
+        "resume": ["resume", out],
+        "sweep": ["sweep", tmp_path / "sweep.yaml", "--out", out, "--force"],
+        "chart": ["chart", ball, "--out", out, "--axis", "grid"],
+        "loops": ["loops", tmp_path / "loops.csv", "--out", out, "--normal-load", "1 N"],
+    }[command]
+    before = sorted(out.iterdir())
+    ending = invoke(*arguments)
+    assert ending.exit_code == 2
+    (line,) = ending.stderr.splitlines()
+    assert line.startswith(f"fretscale: {out}: in use by process {holder.pid} on ")
+    assert f"on {socket.gethostname()} since 2" in line
+    assert sorted(out.iterdir()) == before
+
+
+@posix_only
+def test_the_lock_of_a_process_that_was_killed_is_told_and_taken(out, holder, ball):
+    killed(holder)
+    assert (out / LOCK).exists()
+    ending = invoke("run", ball, "--out", out)
+    assert ending.exit_code == 0, ending.stderr
+    told = f"process {holder.pid} on {socket.gethostname()} since "
+    assert ending.stderr.startswith(told)
+    assert "has gone and left its lock" in ending.stderr
+    assert told in (out / "run.log").read_text()
+    assert json.loads((out / "summary.json").read_text())["warnings"] == []
+    assert not (out / LOCK).exists()
+
+
+@posix_only
+def test_a_number_that_another_process_has_by_now_is_not_believed(out):
+    """Only the system's lock counts: process 1 runs, but holds no lock."""
+    left_by(out, socket.gethostname())
+    with locked(out) as gone:
+        assert gone.startswith("process 1 on ")
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="a file system of Linux")
+def test_where_no_folder_can_be_made_one_line_says_so(ball):
+    """/proc reports that the folder does not exist, as after a removal by another process."""
+    ending = invoke("run", ball, "--out", "/proc/out")
+    assert ending.exit_code == 2
+    assert ending.stderr == "fretscale: /proc/out: No such file or directory\n"
+
+
+@posix_only
+def test_a_lock_of_another_machine_is_for_whoever_knows_it(out):
+    left_by(out, "elsewhere")
+    with (
+        pytest.raises(UserError, match=f"process 1 on elsewhere since .* remove .*{LOCK}"),
+        locked(out),
+    ):
+        pass
+    assert (out / LOCK).exists()
+    with locked(out, take_over=True) as gone:
+        assert "elsewhere" in gone
+    left_by(out, "elsewhere")
+    (out / LOCK).unlink()
+    with locked(out) as gone:
+        assert gone == ""
+
+
+@posix_only
+def test_without_locks_of_the_system_what_is_written_counts(out, monkeypatch):
+    def refuse(*_):
+        raise OSError("no locks available")
+
+    monkeypatch.setattr(lock.fcntl, "flock", refuse)
+    with (
+        locked(out),
+        pytest.raises(UserError, match="as far as can be seen from here"),
+        locked(out),
+    ):
+        pass
+    with locked(out) as gone:
+        assert gone == ""
+
+
+@posix_only
+def test_many_who_want_a_folder_have_it_one_after_the_other(tmp_path):
+    """Locks come and go with their file, and nobody holds one that is already removed."""
+    code = """
+import sys
+from pathlib import Path
+from workflow.shell.folders import lock
+lock.LOOK = 1e-3
+root = Path(sys.argv[1])
+for _ in range(100):
+    with lock.locked(root / "out", patience=60.0):
+        (root / "alone").mkdir()
+        (root / "alone").rmdir()
+"""
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    processes = [subprocess.Popen(command, stderr=subprocess.PIPE) for _ in range(4)]
+    for process in processes:
+        _, said = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, said.decode()
+
+
+@posix_only
+def test_runs_of_many_wait_for_one_that_is_about_to_end(out, holder, ball, monkeypatch):
+    case = load_case(ball)
+    monkeypatch.setattr(running, "PATIENCE", 0.3)
+    with pytest.raises(UserError, match=f"in use by process {holder.pid} "):
+        bring_to_end(case, out)
+    # It ends while it is waited for.
+    monkeypatch.setattr(running, "PATIENCE", PATIENCE)
+    ending = threading.Timer(0.2, killed, [holder])
+    ending.start()
+    assert bring_to_end(case, out)
+    ending.join()
+
+
+def test_nothing_is_left_of_a_command_that_wrote_nothing(tmp_path):
+    with locked(tmp_path / "out"):
+        assert (tmp_path / "out" / LOCK).exists()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_lock_is_no_way_out_of_the_folder(out, tmp_path):
+    out.mkdir()
+    (tmp_path / "mine").write_text("mine")
+    (out / LOCK).symlink_to(tmp_path / "mine")
+    with pytest.raises(OSError, match="symbolic links"), locked(out):
+        pass
+    assert (tmp_path / "mine").read_text() == "mine"

@@ -1,0 +1,198 @@
+"""Tests of terminal output of a run: amount, progress, and final hints."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from rich.console import Console
+
+from tests.marks import slow
+from workflow.cli import TO_TRY, cli
+from workflow.commands.group import LISTED
+from workflow.runs.first_look import first_look
+from workflow.shell.run_time import RunTime
+from workflow.shell.terminal import screen
+from workflow.shell.terminal.reporter import LINE, Reporter
+from workflow.shell.terminal.screen import Loudness
+
+
+def said_by(reporter: Reporter) -> None:
+    reporter.say("a line")
+    reporter.log("a detail")
+    with reporter.stage("mesh"):
+        reporter.warn("too coarse")
+    reporter.close()
+
+
+def without_times(lines: list[str]) -> list[str]:
+    return [re.sub(r"[\d.]+ s$", "... s", line) for line in lines]
+
+
+@pytest.mark.parametrize(
+    ("loudness", "heard"),
+    [
+        (Loudness.QUIET, ["warning: too coarse"]),
+        (Loudness.NORMAL, ["a line", "warning: too coarse"]),
+        (Loudness.VERBOSE, ["a line", "a detail", "warning: too coarse", "mesh: ... s"]),
+    ],
+)
+def test_the_log_has_all_however_quiet_it_is(
+    loudness: Loudness, heard: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said_by(Reporter(tmp_path / "log", loudness=loudness))
+    assert without_times(capsys.readouterr().err.splitlines()) == heard
+    logged = [line[9:] for line in (tmp_path / "log").read_text("utf-8").splitlines()]
+    assert without_times(logged) == ["a line", "a detail", "warning: too coarse", "mesh: ... s"]
+
+
+@pytest.fixture
+def terminal(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
+    """Replace stderr by a terminal of 80 or other columns; return a function with its content.
+
+    It moves its cursor, whatever terminal the tests are run on.
+    """
+    shown = io.StringIO()
+    console = Console(
+        file=shown,
+        force_terminal=True,
+        width=getattr(request, "param", 80),
+        highlight=False,
+        _environ={"TERM": "xterm"},
+    )
+    monkeypatch.setattr(screen, "console", lambda: console)
+    monkeypatch.setattr(screen, "BRIEF", -1.0)
+    return shown.getvalue
+
+
+def test_a_stage_shows_how_far_it_is(
+    terminal: Callable[[], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("workflow.shell.terminal.reporter.LOOK", -1.0)
+    reporter = Reporter(tmp_path / "log")
+    with reporter.stage("condensation", "bodies") as told:
+        told(1, 2)
+        reporter._screen._rows.refresh()
+    reporter.close()
+    (row,) = {line for line in terminal().splitlines() if "1 of 2 bodies" in line}
+    assert "condensation" in row
+    assert "more" in row
+
+
+def test_a_long_part_is_forecast_before_any_of_it_is_done(
+    terminal: Callable[[], str], tmp_path: Path
+) -> None:
+    """5 min of wear and 1 min after it are expected, scaled as the start took longer."""
+    reporter = Reporter(tmp_path / "log", expected=RunTime(course=300.0, after=60.0))
+    with reporter.course("wear"):
+        reporter._screen._rows.refresh()
+    reporter.close()
+    assert "about 6 min to go" in terminal()
+
+
+def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_path: Path) -> None:
+    """The remaining time is shown in full, and the progress text is cut."""
+    shown = screen.Screen(on=True)
+    with shown.row("stress under the contacts") as row:
+        row.show(0.5, 20 * "jump 12 of about 40 ", "about 20 min to go")
+        shown._rows.refresh()
+    shown.close()
+    assert "about 20 min to go" in terminal()
+    assert "…" in terminal()
+
+
+@pytest.mark.parametrize("terminal", [40], indirect=True)
+def test_a_narrow_terminal_tells_how_far_it_is_and_no_more(terminal: Callable[[], str]) -> None:
+    """In 40 columns a bar and a forecast would leave no room for it."""
+    rows = screen.Screen(on=True)
+    with rows.row("condensation") as row:
+        row.show(0.4, "2 of 5 steps", "about 20 min more")
+        rows._rows.refresh()
+    rows.close()
+    (line,) = {line for line in terminal().splitlines() if "2 of 5 steps" in line}
+    assert "condensation" in line
+
+
+def test_a_terminal_that_only_prints_is_told_by_lines(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for kind, shows_rows in {"dumb": False, "xterm": True}.items():
+        console = Console(file=io.StringIO(), force_terminal=True, _environ={"TERM": kind})
+        monkeypatch.setattr(screen, "console", lambda console=console: console)
+        assert screen.Screen(on=True).on is shows_rows
+
+
+def test_where_there_is_no_terminal_a_line_now_and_then(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """1000 nodes in ten minutes give ten lines."""
+    now = [100.0]
+    monkeypatch.setattr("time.perf_counter", lambda: now[0])
+    reporter = Reporter(tmp_path / "log")
+    with reporter.stage("condensation", "nodes") as told:
+        for number in range(1, 1001):
+            now[0] += 0.6
+            told(number, 1000)
+    reporter.close()
+    lines = capsys.readouterr().err.splitlines()
+    assert 600.0 / LINE - 2 < len(lines) <= 600.0 / LINE
+    assert "condensation: " in lines[0]
+    assert "of 1000 nodes" in lines[0]
+
+
+# --- the first and the last lines -----------------------------------------------------------------
+
+
+def test_a_run_tells_where_to_look_first(tmp_path: Path) -> None:
+    for name in ("figures/maps.svg", "figures/a.png", "paraview/view.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    (tmp_path / "report.html").touch()
+    assert list(first_look(tmp_path, ["maps", "a"])) == [
+        f"done: {tmp_path}; look first at",
+        f"  report    {tmp_path}/report.html",
+        f"  figure    {tmp_path}/figures/maps.svg",
+        f"  ParaView  paraview --script={tmp_path}/paraview/view.py",
+    ]
+
+
+def test_a_run_without_pictures_tells_its_folder(tmp_path: Path) -> None:
+    assert list(first_look(tmp_path, [])) == [f"done: {tmp_path}"]
+
+
+def to_try() -> list[list[str]]:
+    lines = [line.strip().partition("   ")[0] for line in TO_TRY.splitlines()]
+    return [line.split()[1:] for line in lines if line.startswith("fretscale ")]
+
+
+def test_without_arguments_it_says_what_to_try() -> None:
+    told = CliRunner().invoke(cli, [])
+    assert (told.exit_code, told.stderr) == (0, "")
+    assert TO_TRY in told.stdout
+    assert max(map(len, told.stdout.splitlines())) <= 80
+    assert [arguments[0] for arguments in to_try()] == ["new", "check", "run"]
+
+
+@slow
+def test_what_it_says_to_try_works_and_leaves_a_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for arguments in to_try():
+        assert CliRunner().invoke(cli, arguments).exit_code == 0, arguments
+    assert list(tmp_path.glob("out/ball/figures/*.png"))
+
+
+def test_the_help_lists_every_command_once() -> None:
+    told = CliRunner().invoke(cli, ["--help"], terminal_width=80).stdout
+    assert all(f"{title}:" in told for title in LISTED)
+    assert {name for names in LISTED.values() for name in names} == set(cli.commands)
+    rows = [line.split()[0] for line in told.splitlines() if line.startswith("  ")]
+    for name in cli.commands:
+        assert rows.count(name) == 1
+    assert max(map(len, told.splitlines())) <= 80
+    assert not any(line.endswith("...") for line in told.splitlines()[1:])

@@ -1,0 +1,341 @@
+"""Tests of cases in time: entries, joints that wear under a stroke, commands."""
+
+import csv
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.marks import slow
+from tests.workflow.conftest import invoke, manifest_has_all
+from tests.workflow.vibration.time_scenes import (
+    AMPLITUDE,
+    HAMMER,
+    JOINT,
+    LOOP_ENERGY,
+    RIG,
+    ROUNDING,
+    STIFFNESS,
+    refused,
+    run,
+)
+from workflow.analyses.time.joint import steady_loop
+from workflow.analyses.time.joint_model import JointModel
+from workflow.analyses.time.memory import memory
+from workflow.chart.axes import axes_of
+from workflow.errors import CaseError, UserError
+from workflow.kinds import load_case, parse_case
+from workflow.runs.verify import verify_cases
+
+CASES = Path(__file__).parents[3] / "cases"
+LAWS = ("bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan")
+# --- the case -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "override", "words"),
+    [
+        (JOINT, "ageing={}", "no end given; allowed: energy or cycles"),
+        (JOINT, "ageing={energy: 1 J, cycles: 5}", "both given"),
+        (JOINT, "energies=[1 J, 0 J]", "not ascending"),
+        (JOINT, "energies=[]", "too short; allowed: a list of at least 1, such as [0 J, 1 kJ]"),
+        (JOINT, "drive.stroke=0 um", "above 0"),
+        (JOINT, "joint.law=coulomb", "bouc_wen, jenkins"),
+        (JOINT, "joint.chi=0", "unknown key"),
+        (JOINT, "structure.kind=beam", "allowed: joint, rig, reduced"),
+        (JOINT, "joint={law: bouc_wen, sigma: 0.2}", "at least 0.5"),
+        (JOINT, "output.paraview=true", "nothing to show in ParaView; allowed: false"),
+        (RIG, "structure.springs=[1]", "1 springs for 2 masses"),
+        (RIG, "excitation.mass=3", "no such mass; allowed: 1 to 2"),
+        (RIG, "integration.step=1 ms", "too long for the excitation; allowed: up to 0.000625 s"),
+        (RIG, "excitation.kind=shaker", "harmonic, hammer, recorded"),
+        (RIG, "ageing={energy: 1 J}|energies=[2 J]", "beyond the end"),
+        (RIG, f"{HAMMER}|integration.step=20 us|ageing.energy=1 J", "with a harmonic force"),
+        (RIG, f"{HAMMER}|excitation.band=[3 Hz, 2 Hz]", "not ascending"),
+        (RIG, f"{HAMMER}|excitation.record=1 ms", "over with the blow"),
+    ],
+)
+def test_a_wrong_case_is_refused(text, override, words):
+    with pytest.raises(CaseError) as refusal:
+        parse_case(text, "case.yaml", override.split("|"))
+    assert words in str(refusal.value)
+
+
+def test_evolution_of_what_the_joint_has_not_is_refused():
+    contact = "joint={law: friction_contact, normal_load: 1, friction: 1, stiffness: 1, "
+    overrides = [f"{contact}normal_stiffness: 1}}", "evolution.residual_stiffness={kind: table}"]
+    with pytest.raises(CaseError, match="friction_contact has no residual_stiffness"):
+        parse_case(RIG, "case.yaml", overrides)
+
+
+def test_a_file_beside_a_factor_is_refused(tmp_path):
+    (tmp_path / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
+    evolution = "evolution={file: loops.csv, friction: {kind: linear, slope: 0}}"
+    with pytest.raises(CaseError, match="given beside friction"):
+        parse_case(JOINT, str(tmp_path / "case.yaml"), [evolution])
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("time,force\n0,0\n0,1\n", "times that do not ascend"),
+        ("time\n0\n1\n", "no column force"),
+        ("time,velocity\n0,0\n1,1\n", "no column force; this file has 'time', 'velocity'"),
+        ("time [ms],force [mm]\n0,0\n1,1\n", "force.csv:1: force: unit 'mm' cannot be"),
+        ("time,force\n-1,0\n1,1\n", "force.csv:2: time: -1: out of range; allowed: at least 0"),
+    ],
+)
+def test_a_wrong_record_is_refused(tmp_path, rows, words):
+    (tmp_path / "force.csv").write_text(rows, encoding="utf-8")
+    with pytest.raises(CaseError) as refusal:
+        parse_case(
+            RIG, str(tmp_path / "case.yaml"), ["excitation={kind: recorded, file: force.csv}"]
+        )
+    assert words in str(refusal.value)
+
+
+# --- the joint ----------------------------------------------------------------------------------
+
+
+def test_parameters_follow_the_papers():
+    """Fantetti 2019, table 4.2, at 2800 J, its kp per kJ; Li 2020, table 3, test 4, at 6 kJ."""
+    parameters = JointModel.of(load_case(CASES / "rig_bouc_wen.yaml")).parameters(2.8e6)
+    assert parameters == pytest.approx(
+        {
+            "friction": 0.11 * (1.0 + 0.26 * np.log(1.3e9 * 2800.0 + 1.0)),
+            "stiffness": 27.3e3 * (1.0 + 1.32 * np.exp(-150.0 / 2800.0)),
+            "residual_stiffness": 0.88e3 * (1.0 + 0.24 * 2.8),
+            "normal_load": 60.0,
+        },
+        rel=ROUNDING,
+    )
+    parameters = JointModel.of(load_case(CASES / "bolted_joint_test4.yaml")).parameters(6e6)
+    slow, fast = np.exp(-0.3 * 6.0), np.exp(-5.0 * 6.0)
+    assert parameters == pytest.approx(
+        {
+            "friction": 0.34 * (1.12 - 0.12 * (0.5 * slow + 0.5 * fast)),
+            "stiffness": 115e3 * (1.31 - 0.31 * (0.8 * slow + 0.2 * fast)),
+            "residual_stiffness": 0.0,
+            "normal_load": 745.0 * (0.72 + 0.28 * slow),
+        },
+        rel=ROUNDING,
+    )
+
+
+def test_a_table_of_factors_multiplies_what_the_joint_begins_with():
+    table = "evolution.friction={kind: table, energy: [0 J, 2 J], factor: [1, 3]}"
+    model = JointModel.of(parse_case(JOINT, "case.yaml", [table]))
+    assert model.parameters(1e3)["friction"] == pytest.approx(1.0, rel=ROUNDING)
+    assert model.parameters(1e9)["friction"] == pytest.approx(1.5, rel=ROUNDING)
+
+
+def test_a_table_of_loops_takes_the_place_of_friction_and_stiffness(tmp_path):
+    """The table is as a wear run writes it: kt in N/mm, energy in J."""
+    rows = "energy [J],P [N],kt [N/mm],mu [1]\n0,60,1e4,0.2\n2,60,3e4,0.6\n"
+    (tmp_path / "loops.csv").write_text(rows, encoding="utf-8")
+    case = parse_case(JOINT, str(tmp_path / "case.yaml"), ["evolution={file: loops.csv}"])
+    parameters = JointModel.of(case).parameters(1e3)
+    assert parameters["friction"] == pytest.approx(0.4, rel=ROUNDING)
+    assert parameters["stiffness"] == pytest.approx(2e4, rel=ROUNDING)
+    assert parameters["normal_load"] == 100.0
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("energy [J/mm],P [N/mm],kt [N/mm/mm],mu [1]\n0,60,1e4,0.2\n", "per mm"),
+        ("energy,P,kt\n0,60,1e4\n", "loops.csv:1: no column mu"),
+    ],
+)
+def test_a_table_that_is_not_of_a_whole_joint_is_refused_before_the_run(tmp_path, rows, words):
+    (tmp_path / "loops.csv").write_text(rows, encoding="utf-8")
+    (tmp_path / "case.yaml").write_text(JOINT, encoding="utf-8")
+    ended = invoke("check", tmp_path / "case.yaml", "--set", "evolution={file: loops.csv}")
+    assert ended.exit_code == 2
+    (line,) = ended.stderr.splitlines()
+    assert "evolution.file: " in line
+    assert words in line
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_marched_loop_has_the_energy_of_its_law(law):
+    """Its area by trapezoids agrees to second order in 720 points a cycle."""
+    more = ["joint.chi=-0.5", "joint.beta=1"] if law == "four_parameter_iwan" else []
+    law_of_case = JointModel.of(parse_case(JOINT, "case.yaml", [f"joint.law={law}", *more])).at(0.0)
+    displacement, force, dissipated = steady_loop(law_of_case, AMPLITUDE)
+    assert dissipated == pytest.approx(float(law_of_case.loop_energy(AMPLITUDE)), rel=1e-9)
+    assert np.trapezoid(force, displacement) == pytest.approx(dissipated, rel=1e-4)
+
+
+def test_a_joint_ages_by_the_energy_of_its_loops(tmp_path):
+    """Without evolution every cycle is like the first, 4 µN (A - µN/kt)."""
+    summary = run(tmp_path, JOINT)
+    assert summary["energy"] == pytest.approx(1000.0 * LOOP_ENERGY, rel=1e-9)
+    assert summary["duration"] == pytest.approx(100.0)
+    (first, last) = summary["states"]
+    assert (first["cycles"], last["cycles"]) == (0.0, pytest.approx(1000.0, rel=1e-9))
+    assert last["energy_per_cycle"] == pytest.approx(LOOP_ENERGY, rel=ROUNDING)
+    assert last["stroke"] == pytest.approx(2.0 * AMPLITUDE, rel=ROUNDING)
+    assert last["extracted"]["friction"] == pytest.approx(0.5, rel=1e-9)
+    assert last["extracted"]["stiffness"] == pytest.approx(STIFFNESS, rel=1e-9)
+    assert summary["ageing"]["stretch"]["difference"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_ageing_by_energy_ends_there(tmp_path):
+    summary = run(tmp_path, JOINT, "ageing={energy: 2 J}", "energies=[0 J, 1 J, 2 J]")
+    assert [state["energy"] for state in summary["states"]] == [0.0, 1e3, 2e3]
+    assert summary["cycles"] == pytest.approx(2e3 / LOOP_ENERGY, rel=1e-9)
+
+
+def test_energies_that_are_not_reached_are_told(tmp_path):
+    summary = run(tmp_path, JOINT, "energies=[0 J, 1 kJ]")
+    assert len(summary["states"]) == 2
+    assert "not reached" in summary["warnings"][0]
+
+
+def test_a_joint_that_never_slides_cannot_be_aged_by_energy(tmp_path):
+    code, message = refused(tmp_path, JOINT, "drive.stroke=1 um", "ageing={energy: 1 J}")
+    assert code == 2
+    assert "never reached" in message
+    summary = run(tmp_path / "cycles", JOINT, "drive.stroke=1 um")
+    assert summary["energy"] == 0.0
+    assert summary["states"][-1]["energy_per_cycle"] == 0.0
+
+
+def test_files_of_a_joint(tmp_path):
+    """Datasets have unit and description; tables hold the same; a second run replaces them."""
+    evolution = "evolution.friction={kind: linear, slope: 0.1 1/J}"
+    run(tmp_path, JOINT, evolution, "energies=[0 J, 1 J]", "output.figures=true")
+    folder = tmp_path / "out"
+    with h5py.File(folder / "results.h5") as file:
+
+        def check(name, item):
+            if isinstance(item, h5py.Dataset):
+                assert item.attrs["unit"], name
+                assert item.attrs["description"], name
+
+        file.visititems(check)
+        loop = file["states/00001/loop"]
+        assert file["states/00001"].attrs["energy"] == 1e3
+        table = np.loadtxt(folder / "loop_00001.csv", delimiter=",", skiprows=1)
+        np.testing.assert_allclose(table[:, 1], loop["force"][()], rtol=1e-8, atol=1e-9)
+        mu = file["evolution/friction"][()]
+        np.testing.assert_allclose(mu, 0.5 * (1.0 + 1e-4 * file["evolution/energy"][()]))
+    with (folder / "evolution.csv").open(encoding="utf-8") as stream:
+        assert next(csv.reader(stream))[:3] == [
+            "energy [N mm]",
+            "cycles [1]",
+            "energy_per_cycle [N mm]",
+        ]
+    assert manifest_has_all(folder)
+    assert sorted(path.name for path in (folder / "figures").iterdir()) == [
+        "evolution.png",
+        "loops.png",
+    ]
+    run(tmp_path, JOINT)
+    assert len(list(folder.glob("loop_*.csv"))) == 2
+
+
+def test_reported_values_are_told_beside_the_computed(tmp_path):
+    told = (
+        "reported=[{quantity: states.-1.energy_per_cycle, value: 3 mJ, source: a test}, "
+        "{quantity: states.0.colour, value: 1, source: a test}]"
+    )
+    summary = run(tmp_path, JOINT, told)
+    assert summary["reported"][0] == {
+        "quantity": "states.-1.energy_per_cycle",
+        "reported": 3.0,
+        "computed": pytest.approx(LOOP_ENERGY),
+        "source": "a test",
+    }
+    assert summary["reported"][1]["computed"] is None
+    log = (tmp_path / "out" / "run.log").read_text(encoding="utf-8")
+    assert "mJ computed, 3 mJ reported (a test)" in log
+    assert "no quantity states.0.colour" in summary["warnings"][0]
+
+
+def test_a_preload_worn_to_nothing_ends_the_wear(tmp_path):
+    """With N = N0 (1 - E/2 J), energy tends to 2 J, and the last loops transmit nothing."""
+    wear = "evolution.normal_load={kind: linear, slope: -0.5 1/J}"
+    summary = run(tmp_path, JOINT, wear, "ageing.cycles=1e6", "energies=[0 J, 1 J]")
+    last = summary["states"][-1]
+    assert summary["energy"] == pytest.approx(2e3, rel=1e-6)
+    assert summary["energy"] <= 2e3
+    assert last["normal_load"] == pytest.approx(0.0, abs=1e-3)
+    assert last["extracted"]["friction"] is None or last["force"] > 0.0
+
+
+def test_a_joint_that_cannot_be_is_refused(tmp_path):
+    """The paper's slope of kp per J would give a residual stiffness above the total one."""
+    steep = "evolution.residual_stiffness={kind: linear, slope: 1 1/J}"
+    law = "joint.law=bouc_wen", "joint.residual_stiffness=5 N/um", steep, "ageing={energy: 5 J}"
+    code, message = refused(tmp_path, JOINT, *law)
+    assert code == 2
+    assert "residual_stiffness of a Bouc-Wen joint" in message
+
+
+def test_a_loop_is_read_as_a_measured_one(tmp_path):
+    run(tmp_path, JOINT)
+    ended = invoke("loops", tmp_path / "out" / "loop_00000.csv", "--normal-load", "100 N")
+    assert ended.exit_code == 0, ended.stderr
+    assert f"{LOOP_ENERGY:.4g}" in ended.stdout
+
+
+# --- commands -----------------------------------------------------------------------------------
+
+
+def test_what_can_be_charted(tmp_path):
+    """The step of a rig can; of a joint alone nothing can, as its jumps keep their accuracy."""
+    path = tmp_path / "case.yaml"
+    path.write_text(RIG, encoding="utf-8")
+    assert {axis.name for axis in axes_of(path, [], [])} == {"step"}
+    with pytest.raises(UserError, match="does not apply to this case; allowed: step"):
+        axes_of(path, [], ["grid"])
+    path.write_text(JOINT, encoding="utf-8")
+    with pytest.raises(UserError, match="nothing of a case of this kind can be charted"):
+        axes_of(path, [], [])
+
+
+@pytest.mark.slow
+def test_a_chart_of_the_step(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text(RIG, encoding="utf-8")
+    loud = ("--set", "excitation.force=200 N", "--quantity", "states.0.stroke")
+    ended = invoke("chart", path, "--out", tmp_path / "chart", *loud)
+    assert ended.exit_code == 0, ended.stderr
+
+
+def test_memory_grows_with_what_is_recorded(monkeypatch, tmp_path):
+    short, long = (
+        parse_case(RIG, "case.yaml", [HAMMER, "integration.step=1 us", f"excitation.record={time}"])
+        for time in (1, 100)
+    )
+    assert memory(long).required > 10.0 * memory(short).required / 2.0
+    monkeypatch.setattr("workflow.shell.memory._available_bytes", lambda: 1e9)
+    overrides = HAMMER, "integration.step=1 us", "excitation.record=100"
+    code, message = refused(tmp_path, RIG, *overrides)
+    assert code == 4
+    assert "raise integration.step" in message
+
+
+def test_a_finished_run_is_not_resumed_and_one_that_kept_nothing_starts_again(tmp_path):
+    run(tmp_path, JOINT)
+    assert "nothing to do" in invoke("resume", tmp_path / "out").stdout
+    (tmp_path / "out" / "summary.json").unlink()
+    ended = invoke("resume", tmp_path / "out")
+    assert ended.exit_code == 2
+    assert "its manifest.json does not list its files" in ended.stderr
+
+
+@pytest.mark.parametrize(
+    "name", [slow("rig_bouc_wen"), slow("bolted_joint_test2"), "bolted_joint_test4"]
+)
+def test_papers_joints_are_verified(tmp_path, name):
+    assert verify_cases((CASES / f"{name}.yaml",), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rig_force_75N", "rig_hammer_7N", "rig_hammer_60N"])
+def test_papers_rigs_are_verified(tmp_path, name):
+    assert verify_cases((CASES / f"{name}.yaml",), tmp_path)

@@ -1,0 +1,86 @@
+"""Tests of warnings that the energies of loads differ from those of the half-space."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import CASES
+from wear.contact.interface import FirstContact
+from workflow.analyses.wear.checks.warnings import warn_of_contact
+from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.translation import face_contact
+from workflow.kinds import load_case, parse_case, template
+from workflow.models.structure import StructureLoads
+from workflow.shell.terminal.reporter import Reporter
+
+# A cylinder that is sheared back and forth below its limit: ends slip, the middle sticks.
+ROWS = "P [N/mm],Qx [N/mm],My [N],Edx [N mm/mm]\n1000,300,0,{}\n1000,-300,0,{}\n"
+SETTINGS = [
+    *("structure.dimension=2", "structure.size=3", "contact.grid=[64, 8]"),
+    "structure.gap={shape: paraboloid, radius_x: 20 mm}",
+    "friction.coefficient=0.4",
+]
+COARSE = [
+    "mesh={flank_nodes: [12, 10], size: 8 mm, order: 1}",
+    *("contact.grid=[64, 64]", "load_path.increments=[3, 5]", "contact.method=full"),
+]
+
+
+def begun(source, stage, loads):
+    state, first = stage.begin(loads, 1.0)
+    return source, stage, state, first
+
+
+def of_file(folder: Path, energy: float):
+    (folder / "loads.csv").write_text(ROWS.format(energy, energy), encoding="utf-8")
+    case = parse_case(template("resultants"), str(folder / "case.yaml"), SETTINGS)
+    source = ResultantsSource(case)
+    return case, *begun(source, face_contact(case, source.faces[0]), source.unworn()[0])
+
+
+def told(folder, case, source, stage, state, first) -> list[str]:
+    """Return the warnings about energies."""
+
+    class Both:
+        interfaces = (state,)
+
+    reporter = Reporter(folder / "log")
+    warn_of_contact(case, source, [stage], Both, [first], reporter)
+    return [line for line in reporter.warnings if "dissipate" in line]
+
+
+def test_energies_of_a_file_that_the_half_space_contradicts(tmp_path):
+    case, *contact, first = of_file(tmp_path, 18.0)
+    found = first.energy.sum()
+    assert 0.0 < found < 1.0
+    (line,) = told(tmp_path, case, *contact, first)
+    assert f"says that 36 N are dissipated a cycle, the half-space finds {found:.3g}" in line
+    assert "check Edx and Edy" in line
+    # The half-space's own are believed, and so are those of a mesh that is a little coarse.
+    for factor in (1.0, 1.2, 0.8):
+        scene = of_file(tmp_path, 0.5 * factor * found)
+        assert told(tmp_path, *scene) == []
+
+
+def test_energies_that_are_hardly_any_contradict_nothing(tmp_path):
+    """Rounding of a table causes no warning where everything sticks."""
+    case, source, stage, state, first = of_file(tmp_path, 1e-6)
+    nothing = replace(first, energy=0.0 * first.energy)
+    assert told(tmp_path, case, source, stage, state, nothing) == []
+
+
+@pytest.mark.parametrize(("share", "warned"), [(1.0, False), (0.5, False), (1.7e-4, True)])
+def test_nodes_that_dissipate_what_the_half_space_does_not(tmp_path, share, warned):
+    """Method full wears by the half-space's energies: 0.006, where the nodes have 36."""
+    case = load_case(CASES / "dovetail_2d.yaml", COARSE)
+    source = structure_of(case).source(case)
+    assert isinstance(source, StructureLoads)
+    scene = begun(source, face_contact(case, source.faces[0]), source.unworn()[0])
+    first: FirstContact = scene[-1]
+    less = replace(first, energy=share * first.energy)
+    lines = told(tmp_path, case, *scene[:-1], less)
+    assert len(lines) == warned
+    if warned:
+        assert f"the half-space with its own friction {less.energy.sum():.3g}" in lines[0]

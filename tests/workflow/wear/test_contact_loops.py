@@ -1,0 +1,365 @@
+"""Tests of tangential loops of a wear run: how they are imposed, stored, written and drawn."""
+
+import os
+import shutil
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+from sa_solver.contact import FrictionalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.reference.mindlin import ShearedSphere
+from sa_solver.types import ElasticPair, Grid, Material
+from tests.workflow.conftest import CONTENTS, Run, invoke
+from tests.workflow.shell.interruptions import ctrl_c_after_jumps
+from wear.steps.stepping import ContactFailure
+from workflow.analyses.wear.case.loops import Loops
+from workflow.analyses.wear.figures import loops as loops_figure
+from workflow.analyses.wear.figures import wear as figures
+from workflow.analyses.wear.output.layout import WearContents
+from workflow.analyses.wear.output.loop_table import COLUMNS
+from workflow.analyses.wear.worn.contact_loops import (
+    MEASURED,
+    kept_loops,
+    warn_of_border,
+    write_loops,
+)
+from workflow.case.fields import Quantity
+from workflow.case.files.table_file import read_columns
+from workflow.commands.computed_loops import report_of_loops
+from workflow.errors import CaseError, UserError
+from workflow.kinds import load_case
+from workflow.models.loops import TangentialLoops, worn_loop
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.store import write_arrays
+from workflow.shell.output.results import writing
+
+BODY = Material(115e3, 0.0)
+SPHERE = ShearedSphere(400.0, 10.0, BODY, BODY, 0.7)
+FORCE = 0.5 * SPHERE.sliding_force
+
+# Two balls under loads of a table: no structure to condense, whose friction would take the time.
+LOADS = """\
+interface, P, Qx, Qy, Mx, My, Mz, Edx, Edy
+left,  400, -160, 0, 0, 0, 0, 3, 0
+left,  400,  160, 0, 0, 0, 0, 3, 0
+right, 300, -120, 0, 0, 0, 0, 2, 0
+right, 300,  120, 0, 0, 0, 0, 2, 0
+"""
+BALLS = """\
+title: Two balls that wear under loads of a table
+analysis: wear
+structure:
+  kind: resultants
+  file: loads.csv
+  dimension: 3
+  size: [1 mm, 1 mm]
+  gap: {shape: paraboloid, radius_x: 10 mm, radius_y: 10 mm}
+materials:
+  body_1: {young: 115 GPa, poisson: 0.29}
+  body_2: {young: 115 GPa, poisson: 0.29}
+friction: {coefficient: 0.4}
+contact: {grid: [16, 16]}
+wear:
+  law: energy
+  body_1: {coefficient: 1e4 um^3/J}
+  body_2: {coefficient: 1e4 um^3/J}
+  cycles: 3e4
+  step: {kind: implicit, cycles: 1e4}
+stress: {section: none, life: {parameter: none}}
+output: {paraview: false, figures: false}
+"""
+AMPLITUDE = 0.01
+# Coarse loops, because only their storage is tested, not their accuracy.
+ASKED = f"loops.amplitude={AMPLITUDE} mm", "loops.increments=3"
+
+
+def state(P=400.0, Mx=0.0, My=0.0, grid=None):
+    """Return an interface before wear, with its peak load in the second of two increments."""
+    loads = SimpleNamespace(
+        **{k: np.array([0.0, v]) for k, v in (("P", P), ("Mx", Mx), ("My", My))}
+    )
+    gap = None if grid is None else SPHERE.contact.gap(grid.x, grid.y)
+    return SimpleNamespace(loads=loads, surfaces=SimpleNamespace(gap=gap), energy=1500.0)
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    """Return a loop of a sphere in partial slip."""
+    size = 2.2 * SPHERE.contact.contact_radius
+    grid = Grid.covering((size, size), (32, 32))
+    contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
+    return worn_loop(contact, TangentialLoops(force=FORCE), "sphere", state(grid=grid), 1)
+
+
+# --- what is imposed ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("every", "jump", "ended", "due"),
+    [
+        ("jump", 0, False, True),
+        ("jump", 3, False, True),
+        ("end", 0, False, True),
+        ("end", 3, False, False),
+        ("end", 3, True, True),
+    ],
+)
+def test_loops_are_due(every, jump, ended, due):
+    assert TangentialLoops(amplitude=5e-3, every=every).due(jump, ended) is due
+
+
+def test_path_is_that_of_the_peak_load():
+    path = TangentialLoops(amplitude=5e-3, axis="y", increments=7).path("face", state(My=-80.0), 1)
+    assert (path.P, path.moments, path.amplitude, path.by) == (400.0, (0.0, -80.0), 5e-3, "motion")
+    assert (path.axis, path.increments) == ("y", 7)
+
+
+def test_a_normal_force_of_ones_own_acts_along_the_same_line():
+    path = TangentialLoops(force=3.0, normal_force=100.0).path("face", state(Mx=40.0, My=-80.0), 1)
+    assert (path.P, path.moments, path.amplitude, path.by) == (100.0, (10.0, -20.0), 3.0, "force")
+    open_face = TangentialLoops(force=3.0, normal_force=100.0).path("face", state(P=0.0), 1)
+    assert (open_face.P, open_face.moments) == (100.0, (0.0, 0.0))
+
+
+def test_a_face_without_load_is_refused():
+    with pytest.raises(UserError, match=r"face carries nothing .* loops.normal_force"):
+        TangentialLoops(amplitude=5e-3).path("face", state(P=0.0), 1)
+
+
+def test_both_drives_are_refused(small_path):
+    with pytest.raises(CaseError, match=r"loops.force: amplitude and force given; allowed: one"):
+        load_case(small_path, ["loops={amplitude: 5 um, force: 3 N}"])
+    assert not load_case(small_path).loops.wanted
+
+
+def test_values_are_those_of_the_loop(sphere):
+    """The values are Mindlin's within the error of 32 cells."""
+    values = sphere.values
+    assert tuple(values) == MEASURED
+    assert values["energy"] == 1500.0
+    assert values["P"] == 400.0
+    assert values["kt"] == pytest.approx(1.0 / SPHERE.tangential_compliance, rel=0.01)
+    assert values["energy_per_loop"] == pytest.approx(SPHERE.loop_energy(FORCE), rel=0.01)
+    assert values["amplitude"] == pytest.approx(SPHERE.displacement(FORCE), rel=0.01)
+    assert values["force"] == pytest.approx(FORCE)
+    assert values["mu"] == pytest.approx(0.35)
+    assert values["area"] == pytest.approx(np.pi * SPHERE.contact.contact_radius**2, rel=0.03)
+    off = abs(values["kt"] - 1.0 / SPHERE.tangential_compliance)
+    assert off < values["kt_error"] < 0.05 * values["kt"]
+    assert values["mu_error"] < 1e-6  # the force is imposed
+
+
+def test_force_beyond_friction_ends_the_run_in_one_line():
+    grid = Grid.covering((1.0, 1.0), (8, 8))
+    contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
+    with pytest.raises(ContactFailure, match="tangential loop: friction cannot carry"):
+        worn_loop(contact, TangentialLoops(force=1e4), "sphere", state(grid=grid), 1)
+
+
+# --- kept and written ---------------------------------------------------------------------------
+
+
+def with_loops(root, loop, line=False):
+    """Return results with loops of jumps 0 and 2, as after ``every: end``."""
+    folder = OutputFolder(root)
+    folder.jumps.mkdir(parents=True)
+    for jump in range(3):
+        arrays = kept_loops(["sphere"], [loop]) if jump != 1 else {"other": np.zeros(1)}
+        write_arrays(folder.jump(jump), arrays, {"cycles": 100.0 * jump})
+    with writing(folder.results, line) as writer:
+        write_loops(writer, folder, 2, line)
+        writer.put_grid("grid/sphere", Grid((32, 32), (0.1, 0.1)))
+    return folder
+
+
+@pytest.fixture
+def written(sphere, tmp_path):
+    return with_loops(tmp_path, sphere)
+
+
+@pytest.mark.parametrize(("line", "unit"), [(False, "N"), (True, "N/mm")])
+def test_forces_of_line_contacts_are_per_length(sphere, tmp_path, line, unit):
+    with h5py.File(with_loops(tmp_path, sphere, line).results) as file:
+        assert file["loops/sphere/00000/force"].attrs["unit"] == unit
+        assert file["loops/sphere/00000/displacement"].attrs["unit"] == "mm"
+
+
+def test_results_have_the_loops_of_their_jumps(written, sphere):
+    with h5py.File(written.results) as file:
+        group = file["loops/sphere"]
+        assert list(group) == ["00000", "00002"]
+        np.testing.assert_array_equal(group["00002/force"], sphere.force)
+        np.testing.assert_array_equal(group["00002/displacement"], sphere.displacement)
+        assert group["00002"].attrs["cycles"] == 200.0
+        assert {name: group["00002"].attrs[name] for name in MEASURED} == sphere.values
+        assert all(
+            dataset.attrs[attribute]
+            for dataset in group["00002"].values()
+            for attribute in ("unit", "description")
+        )
+
+
+def test_computed_loops_are_read_as_measured_ones(tmp_path):
+    """The slope after reversals is Mindlin's within the parabola's 0.4 % and 16 cells."""
+    size = 2.2 * SPHERE.contact.contact_radius
+    grid = Grid.covering((size, size), (16, 16))
+    contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
+    amplitude = 3.0 * SPHERE.displacement(SPHERE.sliding_force)
+    asked = TangentialLoops(amplitude=amplitude, increments=48)
+    loop = worn_loop(contact, asked, "sphere", state(grid=grid), 1)
+    with h5py.File(with_loops(tmp_path, loop).results) as file:
+        name, headings, unworn, worn, *_ = report_of_loops(file["loops"])
+    assert (name, headings.split()[-1]) == ("sphere", "mu")
+    _, energy, kt, stuck, _, mu = map(float, worn.split())
+    assert (energy, stuck) == (1.5, pytest.approx(1e-3 * loop.values["kt"], rel=1e-3))
+    assert kt == pytest.approx(1e-3 / SPHERE.tangential_compliance, rel=0.02)
+    assert mu == pytest.approx(0.7, rel=2e-3)
+    assert unworn.split()[1:] == worn.split()[1:]
+
+
+def test_figure_shows_the_loops(written, sphere):
+    with h5py.File(written.results) as file:
+        figure = loops_figure.loops(file, WearContents(("sphere",), ("body_1", "body_2"), 1))
+    kt = sphere.values["kt"] * 1e-3
+    assert f"sphere {kt:.4g} → {kt:.4g} N/µm" in figure.get_suptitle()
+    loop, stiffness, friction, energy = figure.axes
+    assert [line.get_label() for line in loop.lines] == ["unworn", "200 cycles"]
+    np.testing.assert_allclose(loop.lines[0].get_xdata(), 1e3 * sphere.displacement)
+    np.testing.assert_allclose(stiffness.lines[0].get_ydata(), [kt, kt])
+    np.testing.assert_allclose(stiffness.lines[0].get_xdata(), [1.5, 1.5])
+    assert "only mobilised" in friction.get_title()  # at half of what friction bears
+    (bars,) = (bars for bars in stiffness.collections)
+    lower, upper = bars.get_segments()[0][:, 1]
+    assert 0.5 * (upper - lower) == pytest.approx(1e-3 * sphere.values["kt_error"])
+    assert energy.get_ylim()[1] > sphere.values["energy_per_loop"]
+
+
+def test_kinetics_show_area_and_the_band_of_the_extrapolation(results, tmp_path):
+    copy = tmp_path / "results.h5"
+    copy.write_bytes(results.read_bytes())
+    with h5py.File(copy, "a") as file:
+        group = file["kinetics/intrados"]
+        group.attrs.update(depth_trend=-1e-16, depth_scatter=1e-11)
+        figure = figures.kinetics(file, CONTENTS)
+        rate = group.attrs["depth_rate"]
+        last = group["depth_1"][-1] + group["depth_2"][-1]
+    panel, areas = figure.axes[1], figure.axes[5]
+    (band,) = [area for area in panel.collections if area.get_label() == "its uncertainty"]
+    corners = band.get_paths()[0].vertices
+    at_end = corners[np.isclose(corners[:, 0], 2e5), 1]
+    # Half a regime of 6e4 cycles before, 1e5 ahead: |trend| (3e4 + 5e4) 1e5 + scatter 1e5.
+    reach = 1e-16 * 8e4 * 1e5 + 1e-11 * 1e5
+    middle = last + rate * 1e5
+    np.testing.assert_allclose(
+        [at_end.min(), at_end.max()], 1e3 * np.array([middle - reach, middle + reach])
+    )
+    assert "+20.0%" in areas.get_title()
+
+
+def test_warning_of_a_contact_that_outgrows_its_grid():
+    said = []
+    reporter = SimpleNamespace(warn=said.append)
+    loops = {"face": {"unworn": {"border_load": 0.0}, "worn": {"border_load": 0.02}}}
+    warn_of_border(loops, Loops(amplitude=5e-3), reporter)  # then the run has said so
+    assert not said
+    warn_of_border(loops, Loops(amplitude=5e-3, normal_force=1e4), reporter)
+    assert len(said) == 1
+    assert "face: in the tangential loops" in said[0]
+    assert "2.0%" in said[0]
+
+
+# --- runs ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def start_balls(tmp_path_factory):
+    """Return a function that runs the two balls with overrides."""
+    case = tmp_path_factory.mktemp("balls") / "balls.yaml"
+    case.write_text(BALLS, encoding="utf-8")
+    (case.parent / "loads.csv").write_text(LOADS, encoding="utf-8")
+
+    def run(folder, *overrides):
+        settings = [part for entry in overrides for part in ("--set", entry)]
+        return Run(invoke("run", case, "--out", folder, *settings), folder)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def rubbed(start_balls, tmp_path_factory):
+    """Return a run of the balls with a loop after every jump, which tests must not change."""
+    run = start_balls(tmp_path_factory.mktemp("rubbed") / "out", *ASKED)
+    assert run.ending.exit_code == 0, run.ending.stderr
+    return run
+
+
+def test_loops_are_read_only_of_a_run_as_it_was_written(rubbed, tmp_path):
+    """Three increments are too few for a record; a damaged file is refused."""
+    refused = invoke("loops", rubbed.folder)
+    assert (refused.exit_code, "more loops.increments" in refused.stderr) == (2, True)
+    shutil.copytree(rubbed.folder, tmp_path / "cut")
+    os.truncate(tmp_path / "cut/results.h5", 5000)
+    refused = invoke("loops", tmp_path / "cut")
+    assert (refused.exit_code, "not as the run" in refused.stderr) == (2, True)
+
+
+def test_run_writes_a_table_for_every_interface(rubbed):
+    """Cycles, energy, load and area are those of the run; the loop slides, so µ is the case's."""
+    summary = rubbed.summary
+    for name in ("left", "right"):
+        quantities = {column.name: Quantity(column.unit) for column in COLUMNS}
+        file = rubbed.folder / f"loops_{name}.csv"
+        table = SimpleNamespace(**read_columns(str(file), quantities))
+        kinetics = summary["kinetics"][name]
+        np.testing.assert_allclose(table.cycles, summary["kinetics"]["cycles"])
+        np.testing.assert_allclose(table.energy, kinetics["energy"], rtol=1e-9)
+        np.testing.assert_allclose(table.area, kinetics["area"], rtol=1e-9)
+        assert table.P[0] == pytest.approx(summary[name]["peak_load"]["unworn"]["P"], rel=1e-9)
+        np.testing.assert_allclose(table.mu, 0.4, rtol=2e-3)
+        np.testing.assert_array_equal(table.sliding, 1.0)
+        with h5py.File(rubbed.folder / "results.h5") as results:
+            over = results[f"loops_over_energy/{name}"]
+            for column in ("energy", "kt", "kt_error", "mu"):
+                np.testing.assert_allclose(over[column], getattr(table, column), rtol=1e-9)
+            assert [over[column].attrs["unit"] for column in ("energy", "kt")] == ["N mm", "N/mm"]
+        # Wear widens a rounded contact, which stiffens it.
+        assert table.area[-1] > table.area[0]
+        assert table.kt[-1] > table.kt[0]
+        # Sliding as a whole costs less than a rectangle, and more than what is stuck gives back.
+        largest = 4.0 * 0.4 * table.P * AMPLITUDE
+        assert np.all(table.energy_per_loop < largest)
+        assert np.all(table.energy_per_loop > largest - 4.0 * 1.5 * (0.4 * table.P) ** 2 / table.kt)
+        assert summary[name]["loops"]["worn"]["kt"] == pytest.approx(table.kt[-1])
+        assert summary[name]["area"] == kinetics["area"][-1]
+        assert summary[name]["worn_area"] > 0.0
+
+
+def test_loops_change_nothing_else(start_balls, rubbed, tmp_path):
+    plain = start_balls(tmp_path / "out")
+    for name, height in plain.heights().items():
+        np.testing.assert_array_equal(rubbed.heights()[name], height, err_msg=name)
+    assert rubbed.summary["kinetics"] == plain.summary["kinetics"]
+    assert not list(plain.folder.glob("loops_*"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("every", ["end", "jump"])
+def test_resumed_run_keeps_its_earlier_loops(start_balls, resume, rubbed, tmp_path, every):
+    """The loops equal those of an uninterrupted run; with ``end`` the first and last are stored."""
+    with ctrl_c_after_jumps(2):
+        begun = start_balls(tmp_path / "out", *ASKED, f"loops.every={every}")
+        assert begun.ending.exit_code == 130
+    run = resume(tmp_path / "out")
+    assert run.ending.exit_code == 0, run.ending.stderr
+    for name in ("loops_left.csv", "loops_right.csv"):
+        headings, *rows = (rubbed.folder / name).read_bytes().splitlines(keepends=True)
+        kept = rows if every == "jump" else [rows[0], rows[-1]]
+        assert (run.folder / name).read_bytes() == b"".join([headings, *kept])
+
+
+def test_linear_regime_says_where_it_leads(rubbed):
+    """Three jumps are too few for a linear regime, and the summary says so."""
+    assert rubbed.summary["left"]["linear_regime"] == {"depth": None, "volume": None}

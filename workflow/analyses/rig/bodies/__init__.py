@@ -1,0 +1,1 @@
+"""Bodies that a rig consists of: masses, reduced bodies, matrices and specimens."""

@@ -1,0 +1,1 @@
+"""The vibration case and its sections."""

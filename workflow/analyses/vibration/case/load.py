@@ -1,0 +1,135 @@
+"""Loads of a vibration case on its rig, and the displacement of the ground in a motion."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonics import ComplexArray
+from fe_models.dynamics.periodic.load import PeriodicLoad
+from fe_models.dynamics.rig import unit_force
+from sa_solver.types import Array
+from workflow.analyses.rig.places import Moved
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.vibration.case.excitation import (
+    FORCE,
+    LEVEL,
+    ExcitationSize,
+    GroundDisplacement,
+    VibrationExcitation,
+    waves_of,
+)
+from workflow.errors import EntryError
+
+# Share that rounding leaves of forces which cancel each other.
+CANCELLED = 1e-12
+
+
+@dataclass(frozen=True)
+class MovingGround:
+    """A harmonic of the ground's motion at level 1, along the translation ``rigid`` ``(n,)``.
+
+    ``amplitude`` is a in Re a exp(ikωt) of its displacement [mm], or of its acceleration [mm/s²] if
+    it is ``accelerated``.
+    """
+
+    harmonic: int
+    amplitude: complex
+    accelerated: bool
+    rigid: Array
+
+    def displacement(self, frequency: float) -> complex:
+        """Return the complex displacement [mm] of the ground at a frequency [Hz]."""
+        angular = 2.0 * np.pi * frequency * self.harmonic
+        return -self.amplitude / angular**2 if self.accelerated else self.amplitude
+
+
+@dataclass(frozen=True)
+class Driving:
+    """The periodic ``load`` at level 1 without its static part, and the ``ground`` that moves.
+
+    ``amount`` says whether the load is for 1 N or for level 1. ``left_out`` is, for each record,
+    the share above its highest harmonic.
+    """
+
+    load: PeriodicLoad
+    ground: tuple[MovingGround, ...] = ()
+    amount: ExcitationSize = FORCE
+    left_out: tuple[float, ...] = ()
+
+    def absolute(self, motion: HarmonicSolution) -> HarmonicSolution:
+        """Return a motion with absolute displacements, in place of those relative to the ground."""
+        absolute = motion.motion.copy()
+        for moving in self.ground:
+            row = motion.resolution.harmonics.index(moving.harmonic)
+            absolute[row] += motion.force * moving.displacement(motion.frequency) * moving.rigid
+        return replace(motion, motion=absolute)
+
+
+def driving_of(excitation: VibrationExcitation | None, rig: RigModel, highest: int) -> Driving:
+    """Return the excitation of a rig; without an excitation in the case, that of its driven place.
+
+    Records are used up to the ``highest`` harmonic. Raises EntryError for places and directions
+    that the rig does not have.
+    """
+    if excitation is None:
+        # The force is a sine: Re (-i) exp(iωt).
+        return Driving(PeriodicLoad({1: -1j * rig.driven}))
+    return _driven_by(excitation, rig, highest)
+
+
+def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> Driving:
+    size = len(rig.model.mass)
+    waves: defaultdict[int, ComplexArray] = defaultdict(lambda: np.zeros(size, dtype=complex))
+    # Sum of the sizes of all parts of harmonic 1, even where they cancel each other.
+    parts = 0.0
+    inertial: defaultdict[int, ComplexArray] = defaultdict(lambda: np.zeros(size, dtype=complex))
+    for number, force in enumerate(excitation.forces):
+        shape = _shape(rig, force, f"excitation.forces.{number}")
+        waves[force.harmonic] += force.wave * shape
+        parts += abs(force.wave) * float(np.linalg.norm(shape)) * (force.harmonic == 1)
+    for number, record in enumerate(excitation.records):
+        shape = _shape(rig, record, f"excitation.records.{number}")
+        for order, wave in waves_of(record, highest):
+            waves[order] += wave * shape
+            parts += abs(wave) * float(np.linalg.norm(shape)) * (order == 1)
+    ground = []
+    for number, motion in enumerate(excitation.base):
+        if not rig.translations:
+            raise EntryError(
+                f"excitation.base.{number}",
+                "the reduced body is held inside, and does not move "
+                "with the ground as a whole; allowed: a body reduced with what holds it among its "
+                "kept points, or forces",
+            )
+        if motion.direction not in rig.translations:
+            raise EntryError(
+                f"excitation.base.{number}.direction",
+                f"{motion.direction}: the structure does not "
+                f"move so; allowed: {', '.join(rig.translations)}",
+            )
+        along = rig.translations[motion.direction]
+        wave = complex(-1j * motion.amplitude * np.exp(1j * motion.phase))
+        accelerated = not isinstance(motion, GroundDisplacement)
+        if accelerated:
+            waves[motion.harmonic] -= wave * along.inertia
+        else:
+            inertial[motion.harmonic] += wave * along.inertia
+        ground.append(MovingGround(motion.harmonic, wave, accelerated, along.rigid))
+    if not excitation.base and float(np.linalg.norm(waves[1])) <= CANCELLED * parts:
+        raise EntryError(
+            "excitation",
+            "the parts of harmonic 1 cancel each other, and nothing drives at the "
+            "frequency; allowed: parts that leave something of each other",
+        )
+    load = PeriodicLoad(dict(waves), inertial=dict(inertial))
+    return Driving(load, tuple(ground), LEVEL, tuple(excitation.left_out(highest)))
+
+
+def _shape(rig: RigModel, place: Moved, key: str) -> Array:
+    """Return forces ``(n,)`` of 1 N at a place."""
+    shares = rig.place_names.shared(place, key)
+    return np.sum([share * unit_force(rig.model, name) for name, share in shares], axis=0)

@@ -1,0 +1,1 @@
+"""Results of a vibration run: its motions, numbers, tables and files."""

@@ -1,0 +1,138 @@
+"""Motions by their harmonics: complex coefficients of every place and joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.curves.forced_response import ResponseBranch
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonics import ComplexArray
+from sa_solver.types import Array
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.vibration.output.outcome import RESONANCE, Response
+from workflow.shell.output.dataset import Dataset, Datasets
+from workflow.shell.output.tables import DIGITS, heading, write_table
+from workflow.shell.terminal.reporter import Reporter
+
+# Groups of results: points of a curve, and motions at the frequencies of a case.
+CURVE, ANSWER = "curve", "at_{:05d}"
+CONVENTION = "x(t) = sum of Re(c_k exp(i k 2 pi f t)), forces being sines at t = 0"
+MEGABYTE = 1e6
+
+
+def names_of(rig: RigModel) -> dict[str, Dataset]:
+    """Return names of the places ``(p,)`` and of the joints' directions ``(j, d)``."""
+    places = np.array([rig.model.names[place] for place in rig.retained], dtype=np.bytes_)
+    joints = np.array(rig.stretched, dtype=np.bytes_).reshape(rig.joints, rig.directions)
+    stretch = "of every direction of every joint: what it stretches by"
+    return {
+        "places": Dataset(places, "1", "whose displacements have harmonics"),
+        "joints": Dataset(joints, "1", stretch),
+    }
+
+
+def harmonics_of(rig: RigModel, motion: HarmonicSolution) -> dict[str, Dataset]:
+    """Return coefficients ``(k, p)`` of places and ``(k, j, d)`` of joints, of one motion."""
+    orders, parts = motion.resolution.harmonics, _coefficients(rig, motion)
+    return {
+        "frequency": Dataset(np.array(motion.frequency), "Hz", "f, of the motion"),
+        **_datasets(np.array(orders), parts, "by harmonic"),
+    }
+
+
+def harmonics_along(rig: RigModel, branch: ResponseBranch, reporter: Reporter) -> Datasets:
+    """Return coefficients of all points of a curve, with the points along the first axis.
+
+    Harmonics that a motion does not have are 0.
+    """
+    orders = branch.problem.resolution.harmonics
+    along: list[list[ComplexArray]] = []
+    for motion in branch.solutions:
+        rows = [orders.index(order) for order in motion.resolution.harmonics]
+        every = []
+        for part in _coefficients(rig, motion):
+            widened = np.zeros((len(orders), *part.shape[1:]), dtype=complex)
+            widened[rows] = part
+            every.append(widened)
+        along.append(every)
+    parts = tuple(np.array(part) for part in zip(*along, strict=True))
+    size = sum(part.nbytes for part in parts) / MEGABYTE
+    reporter.log(f"harmonics along the curve: {size:.3g} MB before they are packed")
+    frequency = Dataset(branch.frequencies, "Hz", "f, in the order of the curve")
+    datasets = _datasets(np.array(orders), parts, "by point of the curve and harmonic")
+    return {"frequency": frequency, **datasets}
+
+
+def _coefficients(rig: RigModel, motion: HarmonicSolution) -> tuple[ComplexArray, ...]:
+    """Return coefficients of places, and of the displacement and force of joints."""
+    resolution, shape = motion.resolution, (-1, rig.joints, rig.directions)
+    moved, pulled = (
+        resolution.amplitudes(part).reshape(shape)
+        for part in (motion.coefficients, motion.cycle.force)
+    )
+    return motion.motion[:, rig.retained], moved, pulled
+
+
+def _datasets(orders: Array, parts: tuple[ComplexArray, ...], along: str) -> dict[str, Dataset]:
+    places, moved, pulled = parts
+    return {
+        "harmonic": Dataset(orders, "1", "k"),
+        "displacement": Dataset(
+            places, "mm", f"c_k of places against the ground, {along}: {CONVENTION}"
+        ),
+        "joint_displacement": Dataset(moved, "mm", f"c_k of joints, {along}: {CONVENTION}"),
+        "joint_force": Dataset(
+            pulled, "N", f"c_k of what joints resist with, {along}: {CONVENTION}"
+        ),
+    }
+
+
+# --- table --------------------------------------------------------------------------------------
+
+
+def write_harmonics(path: Path, names: Datasets, response: Response) -> None:
+    """Write the motions at resonance and at the frequencies of the case, one harmonic per row.
+
+    Motions at frequencies of the case are counted from 1, as the rows of their table.
+    """
+    rows = [
+        row
+        for group, datasets in response.harmonics.items()
+        if group != CURVE
+        for row in _rows(group, datasets, names)
+    ]
+    write_table(path, _columns(rows), DIGITS, note=f"{CONVENTION}; against the ground")
+
+
+def _rows(group: str, datasets: Datasets, names: Datasets) -> Iterator[Mapping[str, Any]]:
+    values = {name: dataset.values for name, dataset in datasets.items()}
+    motion = RESONANCE if group == RESONANCE else str(int(group.rpartition("_")[2]) + 1)
+    places, joints = (names[kind].values.ravel().tolist() for kind in ("places", "joints"))
+    for k, order in enumerate(values["harmonic"].tolist()):
+        begin = {
+            heading("frequency", "Hz"): float(values["frequency"]),
+            "motion": motion,
+            heading("harmonic", ""): order,
+        }
+        moved, pulled = (values[f"joint_{name}"][k].ravel() for name in ("displacement", "force"))
+        for name, place in zip(places, values["displacement"][k], strict=True):
+            yield begin | _row("place", name, place, None)
+        for name, along, force in zip(joints, moved, pulled, strict=True):
+            yield begin | _row("joint", name, along, force)
+
+
+def _row(kind: str, name: bytes, moved: complex, pulled: complex | None) -> dict[str, Any]:
+    row: dict[str, Any] = {"of": kind, "name": name.decode()}
+    for what, unit, value in (("displacement", "mm", moved), ("force", "N", pulled)):
+        parts = ("", "") if value is None else (float(value.real), float(value.imag))
+        for part, number in zip(("real", "imaginary"), parts, strict=True):
+            row[heading(f"{what}_{part}", unit)] = number
+    return row
+
+
+def _columns(rows: list[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    return {name: [row[name] for row in rows] for name in rows[0]}

@@ -1,0 +1,148 @@
+"""Main results of a steady vibration: resonances and loops under every force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Any
+
+from workflow.analyses.vibration.case.excitation import LEVEL, amount_in, under_in
+from workflow.analyses.vibration.case.vibration_case import VibrationCase
+from workflow.analyses.vibration.output.outcome import AT, MODES
+from workflow.shell.analysis import Summary
+from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+from workflow.shell.output.summary import estimate, told
+
+LINEAR, RECORDS = "linear limits", "left_out_of_records"
+ERROR = "joints' vibration or energy lost, by harmonics and samples"
+# Quantities of the motion at resonance: unit, text, everyday unit.
+NUMBERS = {
+    "resonance": ("Hz", "resonance", ""),
+    "amplitude": ("mm", "amplitude at resonance", ""),
+    "receptance": ("mm/N", "amplitude over force at resonance", "um/N"),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle at resonance", ""),
+    "damping": ("1", "damping ratio at resonance", "%"),
+    "slip": ("1", "share of the cycle in which joints slip", "%"),
+}
+# A resonance's frequency hardly depends on the amplitude, so the error of the motion is not its
+# error.
+WITH_ERROR = "amplitude", "absolute_amplitude", "receptance", "energy_per_cycle"
+LOOP = {
+    "energy": ("N mm", "energy of the loop", ""),
+    "stroke": ("mm", "stroke of the loop", ""),
+    "stiffness": ("N/mm", "stick slope of the loop", "N/um"),
+    "friction": ("1", "friction coefficient of the loop", ""),
+}
+# Quantities at resonance where the ground moves, or the frequency is that of an engine.
+BESIDE = {
+    "absolute_amplitude": ("mm", "absolute amplitude at resonance", ""),
+    "speed": ("rad/s", "speed of the engine at resonance", "rpm"),
+}
+# Quantities of a motion at a frequency of the case.
+ANSWER = {
+    "amplitude": ("mm", "amplitude", ""),
+    "absolute_amplitude": ("mm", "absolute amplitude", ""),
+    "phase": ("rad", "phase before the force", "deg"),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+}
+LOOP_WITH_ERROR = "energy", "stroke"
+# Quantities of a mode over its amplitude.
+MODE = {
+    "linear_frequency": ("Hz", "frequency of the linear mode", ""),
+    "most_damped": ("1", "largest damping ratio", "%"),
+}
+# Curves by which runs are compared, in addition to the numbers.
+CURVES = (
+    CurvesOf(
+        "amplitude",
+        "responses/*/frequency",
+        "responses/*/amplitude",
+        ("Hz", "mm"),
+        logarithmic=True,
+    ),
+    CurvesOf(
+        "loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force", ("mm", "N")
+    ),
+    CurvesOf("phase resonance", "backbone/force", "backbone/frequency", ("", "Hz")),
+    CurvesOf("mode", "modes/*/amplitude", "modes/*/frequency", ("mm", "Hz")),
+)
+
+
+def main_results(case: VibrationCase, summary: Summary) -> list[SummaryQuantity]:
+    """Return results of all responses, their finest loops, and the limits stuck and sliding."""
+    limits = (
+        SummaryQuantity(LINEAR, f"first natural frequency, joints {state}", f"{state}.0", "Hz")
+        for state in ("stuck", "sliding", "free")
+    )
+    records = (
+        SummaryQuantity(
+            "excitation", f"left out of record {number + 1}", f"{RECORDS}.{number}", "1"
+        )
+        for number in range(len(summary.get(RECORDS, ())))
+    )
+    responses = (
+        quantity
+        for number, response in enumerate(summary["responses"])
+        for quantity in (
+            *of_response(under_in(response), f"responses.{number}", response, summary),
+            *_of_loop(under_in(response), f"responses.{number}.loops.-1", summary),
+            *_of_answers(under_in(response), f"responses.{number}", response, summary),
+        )
+    )
+    modes = (
+        quantity
+        for number, mode in enumerate(summary.get(MODES, ()))
+        for quantity in _of_mode(f"mode {mode['mode']}", f"{MODES}.{number}", summary)
+    )
+    return told(summary, [*limits, *records, *responses, *modes])
+
+
+def of_response(
+    group: str, path: str, response: Mapping[str, Any], summary: Summary
+) -> Iterator[SummaryQuantity]:
+    """Yield results of the response to a force or level, at a ``path`` of the summary."""
+    numbers = NUMBERS | {name: told for name, told in BESIDE.items() if name in response}
+    if amount_in(response)[0] is LEVEL:
+        numbers |= {"receptance": ("mm", "amplitude over level at resonance", "")}
+    return _of(group, path, numbers, WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
+
+
+def _of_loop(group: str, path: str, summary: Summary) -> Iterator[SummaryQuantity]:
+    return _of(group, path, LOOP, LOOP_WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
+
+
+def _of_mode(group: str, path: str, summary: Summary) -> Iterator[SummaryQuantity]:
+    error = estimate(summary, f"{path}.error", ERROR)
+    return _of(group, path, MODE, ("most_damped",), error)
+
+
+def _of_answers(
+    group: str, path: str, response: Mapping[str, Any], summary: Summary
+) -> Iterator[SummaryQuantity]:
+    """Yield results of motions at the frequencies of the case, of each one that coexists."""
+    for place, answer in enumerate(response.get(AT, ())):
+        count = len(answer["motions"])
+        for number in range(count):
+            of = f"{path}.{AT}.{place}.motions.{number}"
+            error = estimate(summary, f"{of}.error", ERROR)
+            which = f", motion {number + 1} of {count}" if count > 1 else ""
+            suffix = f" at {answer['frequency']:g} Hz{which}"
+            told = {
+                name: (unit, text + suffix, everyday)
+                for name, (unit, text, everyday) in ANSWER.items()
+                if name in answer["motions"][number]
+            }
+            yield from _of(group, of, told, WITH_ERROR, error)
+
+
+def _of(
+    group: str,
+    path: str,
+    numbers: Mapping[str, tuple[str, str, str]],
+    with_error: tuple[str, ...],
+    error: Mapping[str, Any],
+) -> Iterator[SummaryQuantity]:
+    of = partial(SummaryQuantity, group)
+    for name, (unit, text, everyday) in numbers.items():
+        known = error if name in with_error else {}
+        yield of(text, f"{path}.{name}", unit, everyday=everyday, **known)

@@ -1,0 +1,1 @@
+"""Results of a rig that wears its own contact."""

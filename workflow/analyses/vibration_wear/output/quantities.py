@@ -1,0 +1,84 @@
+"""Main results of a rig that wears its contact: contact and resonances over the cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from itertools import chain
+from typing import Any
+
+from workflow.analyses.vibration.case.excitation import under_in
+from workflow.analyses.vibration.output.quantities import of_response
+from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
+from workflow.case.text.plain import times
+from workflow.shell.analysis import Summary
+from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+from workflow.shell.output.summary import number_at, told
+
+WORN = "depth or volume, by the wear steps, and by harmonics and samples of the motion that wears"
+MOTION = "joints' vibration or energy lost, by harmonics and samples"
+# Quantities of a state: unit, text, everyday unit.
+NUMBERS = {
+    "cycles": ("1", "cycles under the force that wears", ""),
+    "depth": ("mm", "largest depth worn, both bodies together", ""),
+    "volume": ("mm^3", "volume worn, both bodies together", ""),
+    "energy": ("N mm", "energy dissipated so far", ""),
+    "area": ("mm^2", "contact area at rest", ""),
+    "touching": ("1", "nodes in contact at rest", ""),
+    "peak_pressure": ("MPa", "largest pressure at rest", ""),
+    "stiffness": ("N/mm", "tangential stiffness", "N/um"),
+    "stroke": ("mm", "stroke under the force that wears", ""),
+    "frequency": ("Hz", "frequency of the motion that wears", ""),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+}
+# Parts of the error of each quantity, which add up, and a description of that error.
+ERRORS = {
+    "depth": (("step_error", "error"), WORN),
+    "volume": (("step_error", "error"), WORN),
+    "stroke": (("error",), MOTION),
+    "energy_per_cycle": (("error",), MOTION),
+}
+# Curves by which runs are compared, in addition to the numbers.
+CURVES = (
+    CurvesOf("worn depth", "evolution/cycles", "evolution/depth", ("1", "mm")),
+    CurvesOf("worn volume", "evolution/cycles", "evolution/volume", ("1", "mm^3")),
+    CurvesOf("tangential stiffness", "evolution/cycles", "evolution/stiffness", ("1", "N/mm")),
+    CurvesOf(
+        "amplitude in the last state",
+        "worn/-1/responses/*/frequency",
+        "worn/-1/responses/*/amplitude",
+        ("Hz", "mm"),
+        logarithmic=True,
+    ),
+    CurvesOf(
+        "loop in the last state", "worn/-1/loop/displacement", "worn/-1/loop/force", ("mm", "N")
+    ),
+)
+
+
+def main_results(case: VibrationWearCaseBase, summary: Summary) -> list[SummaryQuantity]:
+    """Return results of every state, the unworn one first."""
+    states = enumerate(summary["states"])
+    return told(summary, chain.from_iterable(_of_state(n, state, summary) for n, state in states))
+
+
+def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[SummaryQuantity]:
+    ends = number == len(summary["states"]) - 1
+    begun = f"after {times(state['cycles'])} cycles" if state["cycles"] else "unworn"
+    group = "at the end" if ends else begun
+    place = f"states.{number}"
+    of = partial(SummaryQuantity, group)
+    for name, (unit, text, everyday) in NUMBERS.items():
+        known = _error(name, place, summary)
+        yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
+    for force, response in enumerate(state["responses"]):
+        under = f"{group}, {under_in(response)}"
+        yield from of_response(under, f"{place}.responses.{force}", response, summary)
+
+
+def _error(name: str, place: str, summary: Summary) -> dict[str, Any]:
+    """Return the error of a number of a state with its description, empty if a part is unknown."""
+    parts, what = ERRORS.get(name, ((), ""))
+    known = [number_at(summary, f"{place}.{part}") for part in parts]
+    errors = [abs(part) for part in known if part is not None]
+    return {"error": sum(errors), "error_of": what} if parts and len(errors) == len(parts) else {}

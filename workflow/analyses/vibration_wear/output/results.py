@@ -1,0 +1,170 @@
+"""Output of a vibration case with wear: results, tables, figures and the summary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from workflow.analyses.vibration.case.excitation import ExcitationSize
+from workflow.analyses.vibration.output.outcome import trend
+from workflow.analyses.vibration.output.results import put_response_curves
+from workflow.analyses.vibration_wear.case import (
+    FrictionRigWearCase,
+    ReducedWearCase,
+    VibrationWearCase,
+)
+from workflow.analyses.vibration_wear.output.outcome import (
+    EVOLUTION,
+    NODES,
+    PLACES,
+    POSITION,
+    RESPONSES,
+    WORN,
+    VibrationWearContents,
+    VibrationWearOutcome,
+    WornNodes,
+    WornRig,
+)
+from workflow.shell.analysis import Run
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.output.results import CurveAxis, On, run_results
+from workflow.shell.output.summary import finish
+from workflow.shell.output.tables import DIGITS, heading, write_curves, write_table
+
+VibrationWearRun = Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]
+
+# Quantities whose trend is reported, in addition to the resonance under the least force.
+TRENDS = ("stiffness", "peak_pressure", "touching")
+# N mm to J, N/mm to N/µm, mm to µm.
+TO_JOULES, PER_MICRON, TO_MICRONS = 1e-3, 1e-3, 1e3
+
+
+def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
+    """Write all files of a finished run; the summary comes last and marks it as finished."""
+    folder, reporter = run.folder, run.reporter
+    with reporter.stage("results"):
+        _write_results(outcome, run)
+        _write_tables(outcome, folder)
+    run.draw(_contents(outcome))
+    finish(
+        run,
+        _summary(outcome),
+        (f"  {_line(outcome.case.amount, state)}" for state in outcome.states),
+    )
+
+
+# --- results ------------------------------------------------------------------------------------
+
+
+def _contents(outcome: VibrationWearOutcome) -> VibrationWearContents:
+    if outcome.nodes is None:
+        return VibrationWearContents(at_nodes=False)
+    known = outcome.nodes.datasets
+    on_plane = "x" in known
+    return VibrationWearContents(
+        at_nodes=True, placed=on_plane or POSITION in known, on_plane=on_plane
+    )
+
+
+def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
+    case = outcome.case
+    attributes = {
+        "analysis": case.analysis,
+        "forces": list(case.amounts),
+        "amount": case.amount.name,
+    }
+    with run_results(run, case, attributes) as writer:
+        writer.put_contents(_contents(outcome))
+        if outcome.grid is not None:
+            writer.put_grid("grid", outcome.grid)
+        if outcome.nodes is not None:
+            writer.put(PLACES, {**outcome.nodes.datasets, **_named(outcome.nodes)})
+        writer.put(EVOLUTION, outcome.evolution, CurveAxis("cycles"))
+        for number, state in enumerate(outcome.states):
+            place = f"{WORN}/{number:05d}"
+            writer.put(place, {}, **state.numbers)
+            on = None if outcome.grid is None else On("grid")
+            for group, datasets in state.fields.items():
+                writer.put(f"{place}/{group}", datasets, on)
+            for force, response in enumerate(state.responses):
+                where = f"{place}/{RESPONSES}/{force:05d}"
+                put_response_curves(writer, where, case.amount, response)
+
+
+def _named(nodes: WornNodes) -> dict[str, Dataset]:
+    """Return the names of nodes, empty if they have none."""
+    names = np.array(nodes.names, dtype=np.bytes_)
+    return {"name": Dataset(names, "1", "of the point of each contact")} if nodes.names else {}
+
+
+# --- tables -------------------------------------------------------------------------------------
+
+
+def _write_tables(outcome: VibrationWearOutcome, folder: OutputFolder) -> None:
+    """Write the evolution and the responses of every state to every force as CSV, in base units."""
+    under, what = outcome.case.amount.under, "contact and resonances, over the cycles"
+    write_curves(folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution)
+    for number, state in enumerate(outcome.states):
+        for force, response in enumerate(state.responses):
+            what = f"response {under(response.force)} after {state.cycles:g} cycles"
+            path = folder.reserve(f"frf_{number:05d}_{force:05d}.csv", f"{what}, over frequency")
+            write_curves(path, response.curves)
+    if outcome.nodes is not None:
+        for number, state in enumerate(outcome.states):
+            _write_nodes(outcome.nodes, number, state, folder)
+
+
+def _write_nodes(nodes: WornNodes, number: int, state: WornRig, folder: OutputFolder) -> None:
+    """Write depths and energies of the nodes in a state, a row for each node."""
+    what = f"nodes after {state.cycles:g} cycles: gaps, depths, energies of a cycle"
+    path = folder.reserve(f"{NODES}_{number:05d}.csv", what)
+    columns: dict[str, Any] = {heading("point", ""): nodes.names} if nodes.names else {}
+    for name, dataset in {**nodes.datasets, **state.fields[NODES]}.items():
+        by_axis = dataset.values.reshape(len(dataset.values), -1).T
+        axes = "xyz" if len(by_axis) > 1 else ("",)
+        for axis, values in zip(axes, by_axis, strict=True):
+            columns[heading(f"{name}_{axis}".strip("_"), dataset.unit)] = values
+    write_table(path, columns, DIGITS)
+
+
+# --- summary ------------------------------------------------------------------------------------
+
+
+def _summary(outcome: VibrationWearOutcome) -> dict[str, Any]:
+    states, last = outcome.states, outcome.states[-1].numbers
+    energy = last["energy"]
+    return {
+        "volume_per_energy": last["volume"] / energy if energy > 0.0 else 0.0,
+        "states": [_of_state(outcome.case.amount, state) for state in states],
+        "trend": {
+            name: trend([state.numbers[name] for state in states])
+            for name in TRENDS
+            if name in states[0].numbers
+        }
+        | {"resonance": trend([state.responses[0].numbers["resonance"] for state in states])},
+    }
+
+
+def _of_state(amount: ExcitationSize, state: WornRig) -> dict[str, Any]:
+    responses = [{amount.name: response.force, **response.numbers} for response in state.responses]
+    # JSON has no NaN.
+    numbers = {name: value for name, value in state.numbers.items() if value == value}
+    return {**numbers, RESPONSES: responses}
+
+
+def _line(amount: ExcitationSize, state: WornRig) -> str:
+    """Return a state as one line of text."""
+    numbers = state.numbers
+    resonances = ", ".join(
+        f"{response.numbers['resonance']:.4g} Hz {amount.under(response.force)}"
+        for response in state.responses
+    )
+    stiffness = PER_MICRON * numbers["stiffness"]
+    sticks = f"kt {stiffness:.4g} N/um, " if np.isfinite(stiffness) else ""
+    return (
+        f"{state.cycles:g} cycles, {TO_JOULES * numbers['energy']:.4g} J: {sticks}depth "
+        f"{TO_MICRONS * numbers['depth']:.3g} um, stroke {TO_MICRONS * numbers['stroke']:.3g} um; "
+        f"resonance {resonances}"
+    )

@@ -1,0 +1,1 @@
+"""Checks of a finished wear run, which lead to warnings."""

@@ -1,0 +1,261 @@
+"""Plausibility warnings about a run that completes without errors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fe_models.meshes.structure_mesh import Face, Interface
+from fe_models.structure import CLOSED, InterfaceHistory
+from sa_solver.types import ElasticPair, LoadHistory, Mask
+from wear.contact.interface import FirstContact
+from wear.coupled import CoupledState
+from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
+from workflow.analyses.wear.case.sections import SIZES, Duration
+from workflow.analyses.wear.output.link_report import report_link
+from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.case.text.plain import counted
+from workflow.models.contact import FaceContact
+from workflow.models.loads import LoadSource
+from workflow.models.structure import StructureLoads
+from workflow.shell.few_cells import check_cells
+from workflow.shell.terminal.reporter import Reporter
+
+# Relative imbalance of forces and moments on a body; the friction solver reaches 1e-7.
+OUT_OF_BALANCE = 1e-3
+# Least number of loaded nodes across a contact for slips that the mesh resolves.
+FEWEST_NODES = 5
+# Pressure due to the uncertain form of a contact face, relative to its peak. On a cylinder with
+# randomly moved vertices, this estimate was 3 to 8 times the actual change.
+FORM_SHARE = 0.1
+# Relative difference of the energies of structure and half-space that indicates different slips.
+ENERGIES_APART = 0.25
+# Share by which the half-space with its own friction may dissipate less than the nodes, which slip
+# element by element: 0.3 to 0.5 on 12 x 16 nodes that never slide as a whole, 0.01 on 40 nodes
+# across. It may dissipate more, which is why it is used.
+FULL_APART = 0.6
+# Share of the work of sliding below which a difference of energies is rounding of a table.
+NO_ENERGY = 1e-3
+
+
+def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: Reporter) -> None:
+    """Report remarks on the model, cycles that do not close, and faces that lose contact."""
+    for text in case.told_of_nodes():
+        reporter.say(text)
+    for remark in stage.remarks():
+        (reporter.warn if remark.is_warning else reporter.say)(remark.text)
+    unworn = stage.unworn_cycle
+    if unworn.closure > CLOSED:
+        reporter.warn(
+            f"the last two of {unworn.cycles} cycles differ by {unworn.closure:.2%} of the largest "
+            "contact force: the cycle that feeds the wear is not closed"
+        )
+    imbalance = float(unworn.equilibrium.max())
+    if imbalance > OUT_OF_BALANCE:
+        reporter.warn(
+            f"forces and moments on a body are out of balance by {imbalance:.1e}: the stiffness of "
+            "peak load does not suit the other increments (nonlinearity.stiffness)"
+        )
+    for history in unworn.histories:
+        name, P = history.interface.name, history.loads.P
+        if P.max() <= 0.0:
+            reporter.warn(f"{name} is open all the time: it does not wear")
+        elif P[stage.peak] <= 0.0:
+            reporter.warn(f"{name} is open at peak load: its pressure and stress there are none")
+        else:
+            _warn_of_few_nodes(history, stage, reporter)
+            _warn_of_form(history, stage, reporter)
+
+
+def _warn_of_few_nodes(
+    history: InterfaceHistory, stage: StructureLoads, reporter: Reporter
+) -> None:
+    """Warn of a contact on so few nodes that the structure hardly resolves its size."""
+    face = history.interface
+    pressed = int(np.count_nonzero(history.force[stage.peak, 2] > 0.0))
+    least = FEWEST_NODES if face.line else FEWEST_NODES**2
+    if pressed < min(least, len(face)):
+        reporter.warn(
+            f"{face.name}: the peak load is carried by {counted(pressed, 'node')} of a mesh of "
+            f"{_mesh_size(face):.2g} mm, where {least} tell a contact from a point: its slip and "
+            f"tilt are the mesh's; {stage.model.finer}"
+        )
+
+
+def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Reporter) -> None:
+    """Warn of faces whose form is less certain in the mesh than the pressure requires."""
+    face = history.interface
+    assert isinstance(face, Interface)
+    pressed = history.force[stage.peak, 2] > 0.0
+    unsure = form_left(face, pressed)
+    bodies = (stage.structure.bodies[place].elastic.material for place in face.bodies)
+    # Waves of twice an element on a half-space: p = π E* height / wavelength (Johnson, 13.2).
+    waves = np.pi * ElasticPair(*bodies).contact_modulus * unsure / (2.0 * _mesh_size(face))
+    share = float(waves / history.pressure[stage.peak].max())
+    if share > FORM_SHARE:
+        reporter.warn(
+            f"{face.name}: vertices alone tell the form of its faces to {1e3 * unsure:.2g} µm, "
+            f"which may be {share:.0%} of its peak pressure; give the bodies as CAD, or with "
+            "midside nodes"
+        )
+
+
+def form_left(face: Interface, pressed: Mask) -> float:
+    """Return the error of form of both bodies under the nodes ``pressed`` ``(n,)`` [mm]."""
+    below = pressed if face.projection is None else face.projection.T @ pressed > 0.0
+    left = 0.0
+    for number, nodes in ((1, below), (2, pressed)):
+        surface = face.face(number).surface
+        if surface is not None and surface.left is not None:
+            left += float(surface.left[nodes].max(initial=0.0))
+    return left
+
+
+def _mesh_size(face: Face) -> float:
+    """Return the size of the facets of a face, along their sides [mm]."""
+    return float(np.median(face.facet_sizes if face.line else np.sqrt(2.0 * face.facet_sizes)))
+
+
+def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:
+    """Warn if the cycle of a loads file does not close, as far as the file says."""
+    closures = [imported.closure or 0.0 for imported in source.imported.values()]
+    if max(closures) > CLOSED:
+        reporter.warn(
+            f"structure.file: {source.file}: its cycle differs from the one before by "
+            f"{max(closures):.2%} of the largest contact force: the cycle that feeds the wear is "
+            "not closed; march more cycles there, and take the last"
+        )
+
+
+def warn_of_contact(
+    case: WearCase,
+    source: LoadSource,
+    stages: list[FaceContact],
+    state: CoupledState,
+    first: list[FirstContact],
+    reporter: Reporter,
+) -> None:
+    """Warn of dissimilar bodies, yielding, contacts at the border or on few cells, and edge peaks.
+
+    Raises UserError if a contact has too few cells.
+    """
+    unlike = [stage.pair for stage in stages if not stage.pair.similar]
+    if case.contact.method == "normal" and unlike:
+        pair = max(unlike, key=lambda pair: abs(pair.dundurs_beta))
+        linked = all(result.link.corrects for result in first)
+        has = "has only as far as the mesh resolves it" if linked else "leaves out"
+        reporter.warn(
+            f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}): shear then moves the "
+            f"surfaces normally, which contact.method: normal {has}; use full"
+        )
+    for stage, interface, result in zip(stages, state.interfaces, first, strict=True):
+        terms = case.terms(stage.name)
+        yield_stress = min(material.yield_stress for material in terms.materials)
+        if case.contact.method != "nodes":
+            report_link(stage.name, result.link, stage.grid.line, reporter)
+        highest = result.pressure.max()
+        if highest > yield_stress:
+            reporter.warn(
+                f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
+                f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
+            )
+        if case.contact.method == "nodes":
+            continue  # the grid only shows them
+        if doubt := _energies_apart(source, stage, interface.loads, result):
+            reporter.warn(f"{stage.name}: {doubt}")
+        if result.touches_border:
+            warn_of_border(stage, reporter)
+        settings, pressure = case.contact_of(stage.name), result.pressure[source.peak]
+        check_cells(stage.name, settings, stage.grid, pressure, reporter)
+        for line in structure_of(case).warnings(case, stage, float(interface.loads.P[source.peak])):
+            reporter.warn(line)
+
+
+def _energies_apart(
+    source: LoadSource, stage: FaceContact, loads: LoadHistory, first: FirstContact
+) -> str:
+    """Return the reason why source and half-space differ in energy, or an empty string."""
+    from_file, told = isinstance(source, ResultantsSource), loads.mean_energy
+    found, unit = float(first.energy.sum()), "N" if stage.grid.line else "N mm"
+    if abs(found - told) <= ENERGIES_APART * max(found, told):
+        return ""
+    if not first.cycle:
+        whose = "structure.file" if from_file else "the structure"
+        return (
+            f"pressure on the grid and slip of {whose} dissipate {found:.3g} {unit} a cycle, "
+            f"{whose} {told:.3g}: its mesh is too coarse for the slip zone, or little slips; "
+            "refine it or use contact.method: full"
+        )
+    if from_file and abs(found - told) > NO_ENERGY * _work_of_sliding(stage, loads):
+        return (
+            f"structure.file says that {told:.3g} {unit} are dissipated a cycle, the half-space "
+            f"finds {found:.3g} under the same forces, and wears by it: check Edx and Edy (of each "
+            "increment alone), friction.coefficient, size and gap of the face, and that the mesh "
+            "that they are from is fine enough for the slip zone"
+        )
+    if isinstance(source, StructureLoads) and told > found / (1.0 - FULL_APART):
+        return (
+            f"the structure's nodes dissipate {told:.3g} {unit} a cycle, the half-space with its "
+            f"own friction {found:.3g}, and wears by it: the mesh is too coarse for the slip zone; "
+            "refine it"
+        )
+    return ""
+
+
+def _work_of_sliding(stage: FaceContact, loads: LoadHistory) -> float:
+    """Return the approximate work of friction at the onset of sliding: (µP)² over the stiffness."""
+    friction = stage.settings.friction(0.0)
+    shear, modulus = friction * float(loads.P.max()), stage.pair.contact_modulus
+    width = 1.0 if stage.grid.line else np.sqrt(np.prod(stage.grid.size))
+    return float(shear**2 / (modulus * width))
+
+
+def warn_of_instability(
+    stages: list[FaceContact], state: CoupledState, cycles: float, reporter: Reporter
+) -> None:
+    """Warn of explicit steps with more cycles than is stable."""
+    pairs = zip(stages, state.interfaces, strict=True)
+    stable = min(stage.stable_cycles(interface) for stage, interface in pairs)
+    if cycles > stable:
+        reporter.warn(
+            f"explicit wear steps above {stable:.3g} cycles amplify the grid's roughness "
+            "(wear.step): use implicit steps or smaller ones"
+        )
+
+
+def warn_of_growth(stages: list[FaceContact], state: CoupledState, reporter: Reporter) -> None:
+    """Warn of half-space contacts that have worn up to the border of their grid."""
+    for stage, interface in zip(stages, state.interfaces, strict=True):
+        worn = interface.surfaces.depth
+        if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
+            warn_of_border(stage, reporter)
+
+
+def warn_of_many_jumps(wear: Duration, state: CoupledState, left: int, reporter: Reporter) -> None:
+    """Warn of a run with very many jumps, and name the setting that reduces them."""
+    key = next((key for key in SIZES if getattr(wear.step, key) is not None), None)
+    longer = "wear.tolerance" if key is None else f"wear.step.{key}"
+    reporter.warn(
+        f"{state.jump} wear jumps have worn {state.cycles[-1]:.3g} of {wear.cycles:g} cycles, and "
+        f"about {left} are to come: each of them takes time and a place in the results; a larger "
+        f"{longer} makes them fewer"
+    )
+
+
+def warn_of_worn_cells(
+    case: WearCase, peak: int, stages: list[FaceContact], state: CoupledState, reporter: Reporter
+) -> None:
+    """Warn of worn contacts that carry the peak load on few cells."""
+    for stage, interface in zip(stages, state.interfaces, strict=True):
+        if peak in interface.starts:
+            pressure = interface.starts[peak].pressure
+            settings = case.contact_of(stage.name)
+            check_cells(stage.name, settings, stage.grid, pressure, reporter, worn=True)
+
+
+def warn_of_border(stage: FaceContact, reporter: Reporter) -> None:
+    """Warn of a contact that is cut off by the border of its grid."""
+    reporter.warn(
+        f"{stage.name}: the contact touches the border of its grid, where it is cut off: "
+        f"{stage.remedy}"
+    )

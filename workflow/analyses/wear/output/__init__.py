@@ -1,0 +1,1 @@
+"""Results of a wear run: its outcome, numbers, tables and files."""

@@ -1,0 +1,1 @@
+"""Stress under worn contacts."""

@@ -1,0 +1,97 @@
+"""Bolts of a wear run: their tension over a cycle, and its loss as the contacts wear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.contact.face_loads import FaceLoads
+from wear.coupled import CoupledState
+from workflow.models.loads import LoadSource
+from workflow.models.structure import StructureLoads
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.store import read_arrays
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.output.results import CurveAxis, ResultsWriter
+
+# Group of the results, and dataset in the file of a jump.
+BOLTS, TENSION = "bolts", "bolts/tension"
+
+
+def kept_tensions(source: LoadSource, state: CoupledState) -> dict[str, Array]:
+    """Return the tensions ``(bolts, t)`` of a state under its last solved loads, by dataset."""
+    if not isinstance(source, StructureLoads) or not source.bolts:
+        return {}
+    return {TENSION: source.tensions([interface.loads for interface in state.interfaces])}
+
+
+class BoltTensions:
+    """Tensions ``(bolts, t)`` [N] of the bolts of ``stage`` over its unworn and its worn cycle."""
+
+    def __init__(self, stage: StructureLoads, worn: Sequence[FaceLoads]) -> None:
+        self._stage = stage
+        cycles: Mapping[str, Sequence[FaceLoads]] = {"unworn": stage.unworn(), "worn": worn}
+        self.moments = {
+            moment: stage.tensions([face.loads for face in faces])
+            for moment, faces in cycles.items()
+        }
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(bolt.name for bolt in self._stage.bolts)
+
+    def write(self, writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None:
+        """Write tensions over both cycles, and at peak load after every jump.
+
+        Tensions after a jump are those of the last solved loads; the last one is that of the worn
+        cycle.
+        """
+        if not self.names:
+            return
+        peak = self._stage.peak
+        kept = [read_arrays(folder.jump(jump))[0][TENSION] for jump in range(jumps)]
+        kept.append(self.moments["worn"])  # on the last surfaces, whatever the coupling
+        for number, name in enumerate(self.names):
+            over = "tension of the bolt in each increment, as far as it is meshed"
+            cycles = {
+                f"tension_{moment}": Dataset(tensions[number], "N", f"{over}, {moment}")
+                for moment, tensions in self.moments.items()
+            }
+            writer.put(f"{BOLTS}/{name}", cycles)
+            left = Dataset(
+                np.array([tensions[number, peak] for tensions in kept]),
+                "N",
+                "tension at peak load after each jump, as the loads were last solved",
+            )
+            writer.put(f"{BOLTS}/{name}", {"tension": left}, CurveAxis("kinetics/cycles"))
+
+    def summary(self) -> dict[str, Any]:
+        """Return the tensions of each bolt by name; empty without bolts."""
+        if not self.names:
+            return {}
+        bolts = {}
+        for number, bolt in enumerate(self._stage.bolts):
+            told = {m: self._of(tensions[number]) for m, tensions in self.moments.items()}
+            before, after = told["unworn"]["peak"], told["worn"]["peak"]
+            shortening = {} if bolt.force is None else {"shortening": self._shortening(number)}
+            lost = {"lost": 1.0 - after / before} if before else {}
+            bolts[bolt.name] = {**shortening, "tension": told, **lost}
+        return {BOLTS: bolts}
+
+    def sentences(self) -> Iterator[str]:
+        """Yield a sentence on each bolt's tension at peak load, unworn and worn."""
+        per = "/mm" if self._stage.line else ""
+        for name, numbers in self.summary().get(BOLTS, {}).items():
+            before, after = (numbers["tension"][m]["peak"] for m in ("unworn", "worn"))
+            lost = f", {numbers['lost']:.3g} of it lost" if "lost" in numbers else ""
+            yield f"{name}: tension {before:.4g} -> {after:.4g} N{per} at peak load{lost}"
+
+    def _shortening(self, number: int) -> float:
+        return float(self._stage.shortenings[number])
+
+    def _of(self, tension: Array) -> dict[str, float]:
+        ends = {"least": tension.min(), "largest": tension.max()}
+        return {name: float(n) for name, n in {"peak": tension[self._stage.peak], **ends}.items()}

@@ -1,0 +1,120 @@
+"""Tangential loops on the worn contacts of a wear run.
+
+A loop is run for the unworn state and after every wear step, or only at the end. It is stored with
+the fields of its jump, so that a resumed run still has it. All loops are copied to ``results.h5``
+and, one row per loop, to ``loops_<interface>.csv``
+(:mod:`workflow.analyses.wear.output.loop_table`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.analyses.wear.case.loops import Loops
+from workflow.analyses.wear.output.loop_table import COLUMNS, SLIDES, LoopColumn, write_loop_table
+from workflow.models.loops import WornLoop
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.output.results import ResultsWriter
+from workflow.shell.terminal.reporter import Reporter
+
+# Quantities that every loop measures; the cycles are those of the jump.
+MEASURED = tuple(column.name for column in COLUMNS if column.name != "cycles")
+# Groups of a file above those of interfaces and jumps.
+LOOPS, LOOPS_OVER_ENERGY = "loops", "loops_over_energy"
+OVER_ENERGY = "energy", "kt", "kt_error", "mu", "mu_error"
+
+
+def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:
+    """Return the loops of the contacts ``names`` as arrays for the file of their jump."""
+    arrays: dict[str, Array] = {}
+    for name, loop in zip(names, loops, strict=True):
+        place = f"{LOOPS}/{name}"
+        arrays[f"{place}/values"] = np.array([loop.values[column] for column in MEASURED])
+        arrays |= {f"{place}/displacement": loop.displacement, f"{place}/force": loop.force}
+    return arrays
+
+
+# --- writing ------------------------------------------------------------------------------------
+
+
+def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int, per_length: bool) -> None:
+    """Copy the loops of all jumps, 0 to ``jumps``, into the results: /loops/<interface>/<jump>.
+
+    The measured values are also written against energy: /loops_over_energy/<interface>.
+    """
+    measured: dict[str, list[list[float]]] = {}
+    for jump in range(jumps + 1):
+        with h5py.File(folder.jump(jump), "r") as file:
+            cycles = float(file.attrs["cycles"])
+            for name, kept in file.get(LOOPS, {}).items():
+                _write_loop(writer, f"{LOOPS}/{name}/{jump:05d}", kept, cycles)
+                measured.setdefault(name, []).append(kept["values"][()].tolist())
+    for name, rows in measured.items():
+        columns = dict(zip(MEASURED, np.array(rows).T, strict=True))
+        over = {
+            column.name: Dataset(
+                columns[column.name], _unit(column, per_length), column.description
+            )
+            for column in COLUMNS
+            if column.name in OVER_ENERGY
+        }
+        writer.put(f"{LOOPS_OVER_ENERGY}/{name}", over)
+
+
+def _unit(column: LoopColumn, per_length: bool) -> str:
+    """Return the unit for the results writer, which adds "per mm" to energies, not stiffnesses."""
+    energy = column.name == "energy"
+    return "N mm" if energy else column.units(per_length)[0]
+
+
+def _write_loop(writer: ResultsWriter, place: str, kept: h5py.Group, cycles: float) -> None:
+    along = "of body 1 relative to body 2 along the axis, from the pressed state"
+    curve = {
+        "displacement": Dataset(kept["displacement"][()], "mm", along),
+        "force": Dataset(kept["force"][()], "N", "tangential force on body 2"),
+    }
+    values = dict(zip(MEASURED, kept["values"][()].tolist(), strict=True))
+    writer.put(place, curve, **values, cycles=cycles)
+
+
+def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[str, Any]]:
+    """Write the table of every interface; return the summary's loop entries by interface."""
+    summary: dict[str, dict[str, Any]] = {}
+    with h5py.File(folder.results, "r") as file:
+        for name, group in file.get(LOOPS, {}).items():
+            rows = [{c.name: float(loop.attrs[c.name]) for c in COLUMNS} for loop in group.values()]
+            table = f"loops_{name}.csv"
+            path = folder.reserve(table, f"tangential loops of {name} as it wears")
+            write_loop_table(path, rows, per_length)
+            summary[name] = {"file": table, "unworn": rows[0], "worn": rows[-1]}
+    return summary
+
+
+def warn_of_border(loops: dict[str, dict[str, Any]], asked: Loops, reporter: Reporter) -> None:
+    """Warn of loops whose own normal force presses the contact to the border of its grid."""
+    for name, loop in loops.items():
+        share = max(loop[when]["border_load"] for when in ("unworn", "worn"))
+        if share > 0.0 and asked.normal_force is not None:
+            reporter.warn(
+                f"{name}: in the tangential loops the contact reaches the border of its grid "
+                f"({share:.1%} of the force): lower loops.normal_force"
+            )
+
+
+def loops_sentence(name: str, loops: dict[str, Any], per_length: bool) -> str:
+    """Return a sentence on an interface's loops, from their summary."""
+    first, last = loops["unworn"], loops["worn"]
+    per = "/mm" if per_length else ""
+    off = max(loop["kt_error"] / loop["kt"] for loop in (first, last))
+    mu = "mu" if min(first["sliding"], last["sliding"]) >= SLIDES else "mu, only mobilised,"
+    return (
+        f"{name}: kt {first['kt'] * 1e-3:.4g} -> {last['kt'] * 1e-3:.4g} N/um{per} (within "
+        f"{off:.1%} by the grid), {mu} {first['mu']:.3g} -> {last['mu']:.3g}, energy per "
+        f"loop {first['energy_per_loop']:.4g} -> {last['energy_per_loop']:.4g} mJ{per}"
+    )

@@ -1,0 +1,399 @@
+"""Results of the structure at the end of a run: worn mesh, stress, loads with the worn faces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from fe_models.elasticity.body import maximum_principal
+from fe_models.elasticity.nonlinear import NonlinearCheck
+from fe_models.elasticity.stress import CycleStress, PeakStress, StressField, SurfaceHistory, steps
+from fe_models.meshes.cut_face import WholeStress, whole_components, whole_values
+from fe_models.meshes.quality import element_sizes, elements_across, radius_ratios
+from fe_models.meshes.remesh import form_of, formed_mesh, worn_volume
+from fe_models.meshes.structure_mesh import Body, Interface, MeshError, StructureMesh, write_msh
+from fe_models.structure import CycleSolution, InterfaceHistory
+from sa_solver.half_space.stress import von_mises
+from sa_solver.transforms.threads import begun
+from sa_solver.types import Array, LoadHistory, Tally
+from wear.coupled import CoupledState
+from workflow.analyses.wear.budget.parts import ResultError
+from workflow.analyses.wear.budget.report import datasets_of, summary_of
+from workflow.analyses.wear.output.datasets import put_face
+from workflow.analyses.wear.recording import reported_stage
+from workflow.analyses.wear.structures.resultants.writing import put_closure
+from workflow.analyses.wear.worn.bolts import BoltTensions
+from workflow.models.contact import FaceContact
+from workflow.models.structure import StructureLoads
+from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.store import replacing
+from workflow.shell.output.dataset import Dataset
+from workflow.shell.output.results import ResultsWriter
+from workflow.shell.terminal.reporter import Reporter
+
+RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
+FORCES = ("P", "Qx", "Qy")
+# Results of a total Lagrangian check in the summary, in addition to the resultants.
+MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_rotation")
+
+GLOBAL_STRESS = "stress xx, yy, zz, xy, yz, zx of the global axes"
+# Largest number of increments shown: enough for smooth motion, few enough to store.
+MOST_INCREMENTS = 48
+
+
+@dataclass(frozen=True)
+class WornStructure:
+    """The structure before and after wear: ``cycle`` and ``mesh`` are the worn ones.
+
+    ``stresses`` are those of all bodies, unworn and worn. ``written`` are the meshes for output, in
+    which the faces of bodies 2 have their true form. ``shown`` are the increments, counted from 0,
+    in which the stresses include the surfaces.
+    """
+
+    stage: StructureLoads
+    mesh: StructureMesh
+    cycle: CycleSolution
+    stresses: dict[str, CycleStress]
+    written: dict[str, StructureMesh]
+    shown: list[int]
+
+    @cached_property
+    def bolts(self) -> BoltTensions:
+        """Tensions of the bolts, unworn and worn."""
+        return BoltTensions(self.stage, self.stage.on_faces(self.cycle))
+
+    def under(
+        self, moment: str, number: int
+    ) -> tuple[tuple[Array, Array], tuple[WholeStress, WholeStress], tuple[Array, Array] | None]:
+        """Return motions of both faces of interface ``number``, and stress fields at peak load.
+
+        The third value holds the thermal strains of the faces, or None without temperatures.
+        """
+        stress, interface = self.stresses[moment], self.stage.mesh.interfaces[number]
+        one, two = (whole_components(interface, moved) for moved in stress.faces[number])
+        field_1, field_2 = (
+            WholeStress(stress.fields[place], interface) for place in interface.bodies
+        )
+        if stress.expansions is None:
+            return (one, two), (field_1, field_2), None
+        hot_1, hot_2 = (whole_values(interface, hot) for hot in stress.expansions[number])
+        return (one, two), (field_1, field_2), (hot_1, hot_2)
+
+    def loads(self, number: int) -> InterfaceHistory:
+        """Return the worn cycle of the whole face of interface ``number``."""
+        return self.stage.on_faces(self.cycle)[number]
+
+    def write(self, writer: ResultsWriter, accuracy: float) -> None:
+        """Write load histories of the worn faces, and all bodies unworn and worn."""
+        for history in self.stage.on_faces(self.cycle):
+            name = history.interface.name
+            put_face(writer, f"structure_worn/{name}", history.interface, history)
+            put_closure(writer, f"structure_worn/{name}", self.cycle)
+            put_closure(writer, f"structure/{name}", self.stage.unworn_cycle)
+        for moment, mesh in self.written.items():
+            stress = self.stresses[moment]
+            for body, field in zip(mesh.bodies, stress.fields, strict=True):
+                writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
+            for body, surface in zip(mesh.bodies, stress.surfaces, strict=bool(self.shown)):
+                mission = _mission(body, surface, self.shown)
+                writer.put(f"bodies/{body.name}/{moment}/mission", mission)
+        for name, errors in self._errors().items():
+            writer.put(f"bodies/{name}/error", datasets_of(errors), accuracy=accuracy)
+
+    def summary(self, state: CoupledState) -> dict[str, Any]:
+        """Return statistics of the solver and the largest stresses."""
+        stage, unworn = self.stage, self.stage.unworn_cycle
+        bodies = self.mesh.bodies
+        return {
+            "from_cache": stage.from_cache,
+            "nodes": {body.name: int(body.mesh.nvertices) for body in bodies},
+            "mesh": {body.name: _mesh_summary(body) for body in stage.mesh.bodies},
+            "rigid_modes": stage.rigid_modes,
+            "solutions": state.solutions,
+            "iterations": unworn.iterations,
+            "residual": unworn.residual,
+            "equilibrium_error": float(unworn.equilibrium.max()),
+            "cycles": unworn.cycles,
+            "closure": unworn.closure,
+            "nonlinearity": nonlinearity_summary(stage),
+            "drift": [float(value) for value in state.drift],
+            **self.bolts.summary(),
+            "error": {name: summary_of(errors) for name, errors in self._errors().items()},
+            "peak_stress": {
+                moment: {
+                    body.name: {
+                        **_peak(field.peak),
+                        "at_contact": field.peak.at_contact,
+                        "notch": None if field.notch is None else _peak(field.notch),
+                    }
+                    for body, field in zip(bodies, stress.fields, strict=True)
+                }
+                for moment, stress in self.stresses.items()
+            },
+        }
+
+    def warn(self, accuracy: float, reporter: Reporter) -> None:
+        """Warn of notches whose stress has an error due to the mesh above ``accuracy``."""
+        bodies = self.mesh.bodies
+        for body, *fields in zip(bodies, *self._fields, strict=True):
+            notches = [field.notch for field in fields if field.notch is not None]
+            worst = max(notches, key=lambda notch: notch.error, default=None)
+            if worst is not None and worst.error > accuracy:
+                x, y, z = worst.place
+                reporter.warn(
+                    f"{body.name}: the largest stress on the free surface, {worst.von_mises:.0f} "
+                    f"MPa at X {x:.4g}, Y {y:.4g}, Z {z:.4g} mm, " + self._why(worst, accuracy)
+                )
+
+    @property
+    def _fields(self) -> tuple[tuple[StressField, ...], ...]:
+        """Stress fields of all bodies, unworn and worn."""
+        return tuple(stress.fields for stress in self.stresses.values())
+
+    def _why(self, peak: PeakStress, accuracy: float) -> str:
+        """Return the reason why a stress is unreliable, and a remedy."""
+        if not peak.bounded:
+            return (
+                "is beside a sharp inward corner, a fillet of fewer than nine elements round the "
+                "circle or the end of a clamped or rigid face, where it grows with every "
+                "refinement: round the corner, refine it, or hold the body farther away"
+            )
+        return (
+            f"has an estimated error of {peak.error:.0%} by the mesh, where {100 * accuracy:g} % "
+            f"may pass: {self.stage.model.finer}"
+        )
+
+    def _errors(self) -> dict[str, dict[str, ResultError]]:
+        """Return the error of the largest free-surface stress by body; unknown at sharp corners."""
+        bodies = self.mesh.bodies
+        errors = {}
+        for body, *fields in zip(bodies, *self._fields, strict=True):
+            left = [field.notch for field in fields if field.notch is not None]
+            if left:
+                errors[body.name] = {"notch_stress": ResultError({"mesh": _known(left)})}
+        return errors
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the tensions of bolts and the largest stresses of each body, unworn and worn."""
+        yield from self.bolts.sentences()
+        bodies = self.mesh.bodies
+        for body, unworn, worn in zip(bodies, *self._fields, strict=True):
+            parts = []
+            if unworn.notch is not None and worn.notch is not None:
+                error = _known([unworn.notch, worn.notch])
+                left = "without bound" if error is None else f"the mesh leaves {error:.1%}"
+                parts.append(f"{_change(unworn.notch, worn.notch)} on the free surface ({left})")
+            if worn.peak != worn.notch:
+                where = "on a contact face" if worn.peak.at_contact else "elsewhere"
+                parts.append(f"{_change(unworn.peak, worn.peak)} {where}")
+            yield f"{body.name}: von Mises stress up to {', '.join(parts)}"
+
+    def interface_summary(self, number: int, width: float) -> dict[str, Any]:
+        """Return worn volumes in the mesh and resultants; ``width`` [mm] is that of the contact."""
+        stage, interface = self.stage, self.stage.mesh.interfaces[number]
+        unworn, worn = stage.unworn()[number].loads, self.loads(number).loads
+        swept = [
+            worn_volume(stage.mesh.bodies[place], self.mesh.bodies[place], interface, side)
+            for side, place in enumerate(interface.bodies, start=1)
+        ]
+        return {
+            **({"mirrored_across": planes} if (planes := _mirrored_across(interface)) else {}),
+            "mesh_volume_1": swept[0],
+            "mesh_volume_2": swept[1],
+            "peak_load": {
+                "unworn": resultants_at(unworn, stage.peak),
+                "worn": resultants_at(worn, stage.peak),
+            },
+            "load_range": {"unworn": load_ranges(unworn), "worn": load_ranges(worn)},
+            # Where meshes do not match, the coarser one counts.
+            "elements_across": round(
+                min(elements_across(interface.face(k), width) for k in (1, 2)), 1
+            ),
+        }
+
+
+def _mirrored_across(interface: Interface) -> list[str]:
+    """Return the axes across which planes of symmetry cut an interface."""
+    return ["xy"[axis] for axis in interface.planes]
+
+
+def _known(peaks: Sequence[PeakStress]) -> float | None:
+    """Return the largest error of these stresses, or None if one of them has no bound."""
+    return max(peak.error for peak in peaks) if all(p.bounded for p in peaks) else None
+
+
+def _change(unworn: PeakStress, worn: PeakStress) -> str:
+    return f"{unworn.von_mises:.0f} -> {worn.von_mises:.0f} MPa"
+
+
+def _peak(peak: PeakStress) -> dict[str, Any]:
+    """Return the summary of a largest stress."""
+    return {
+        "von_mises": peak.von_mises,
+        "maximum_principal": peak.maximum_principal,
+        "at": list(peak.place),
+        "error": peak.error,
+    }
+
+
+def _body(body: Body, field: StressField) -> dict[str, Dataset]:
+    """Return the datasets of a body's mesh and stress."""
+    corners = "corner vertices of the tetrahedra, or of the triangles in the plane"
+    principal = "largest principal stress at peak load"
+    return {
+        "points": Dataset(body.points, "mm", "vertices, the faces of body 2 in their form"),
+        "elements": Dataset(body.mesh.t.T, "1", corners),
+        "displacement": Dataset(field.displacement, "mm", "displacement at peak load"),
+        "stress": Dataset(field.stress, "MPa", f"{GLOBAL_STRESS} at peak load"),
+        "von_mises": Dataset(field.von_mises, "MPa", "von Mises stress at peak load"),
+        "maximum_principal": Dataset(field.maximum_principal, "MPa", principal),
+    }
+
+
+def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> dict[str, Dataset]:
+    """Return the datasets of a body's surface over the increments, in single precision."""
+    seen = "surface of the body, or of all of it in the plane"
+    largest = maximum_principal(surface.stress.swapaxes(0, 1))
+    equivalent = von_mises(surface.stress.swapaxes(0, 1))
+    fields = {
+        "displacement": (surface.displacement, "mm", "displacement in each increment"),
+        "von_mises": (equivalent, "MPa", "von Mises stress in each increment"),
+        "maximum_principal": (largest, "MPa", "largest principal stress in each increment"),
+    }
+    return {
+        "increments": Dataset(np.array(shown) + 1, "1", "increments, counted from 1"),
+        "points": Dataset(body.points[surface.vertices], "mm", f"vertices of the {seen}"),
+        "triangles": Dataset(surface.triangles, "1", f"triangles of the {seen}"),
+        **{name: Dataset(field.astype(np.float32), *of) for name, (field, *of) in fields.items()},
+    }
+
+
+def worn_structure(
+    stage: StructureLoads,
+    contacts: list[FaceContact],
+    state: CoupledState,
+    evolves: bool,
+    moves: bool,
+    folder: OutputFolder,
+    reporter: Reporter,
+) -> WornStructure:
+    """Solve the structure with worn gaps, build its worn mesh, write it, and compute stresses.
+
+    If friction ``evolves``, each contact has its coefficient at the end. If the structure
+    ``moves``, the surfaces of all bodies over the increments are included.
+    """
+    pairs = list(zip(contacts, state.interfaces, strict=True))
+    depths = [contact.depths_of_bodies(interface) for contact, interface in pairs]
+    meshed = list(map(meshed_depths, stage.mesh.interfaces, depths))
+    # The friction solution uses one thread and represents worn faces by their gaps.
+    worn = begun(partial(stage.worn_mesh, meshed))
+    with reported_stage(reporter, stage, "structural friction", "increments"):
+        cycle = stage.worn_cycle(
+            [contact.nodal_depth(interface) for contact, interface in pairs],
+            [contact.settings.friction(interface.energy) for contact, interface in pairs]
+            if evolves
+            else None,
+        )
+    with reporter.stage("re-meshing"):
+        mesh = worn()
+        written = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
+        with replacing(
+            folder.reserve("worn.msh", "the mesh with the worn faces, in mm")
+        ) as unfinished:
+            write_msh(unfinished, written["worn"])
+    with reporter.stage("stress", "steps") as told:
+        done = Tally(told, 2 * steps(len(mesh.bodies)))
+        shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
+        states = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
+        stresses = stage.stresses(states, shown, done)
+    return WornStructure(stage, mesh, cycle, stresses, written, shown)
+
+
+def shown_increments(count: int, peak: int) -> list[int]:
+    """Return the increments, counted from 0, to show: evenly spaced, with the peak load."""
+    evenly = np.linspace(0, count - 1, min(count, MOST_INCREMENTS)).round().astype(int)
+    evenly[np.argmin(np.abs(evenly - peak))] = peak
+    return [int(increment) for increment in evenly]
+
+
+def meshed_depths(interface: Interface, depths: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return the depths of both bodies at meshed nodes, which come first in a whole face."""
+    depth_1, depth_2 = depths
+    return depth_1[: len(interface.nodes_1)], depth_2[: len(interface.nodes_2)]
+
+
+def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, StructureMesh]:
+    """Return the meshes, the unworn one first, with vertices moved to the form of their faces.
+
+    Stress is not solved on them: the form ends at the border of its face, where the mesh would get
+    a corner, a notch that the body does not have.
+    """
+    form = form_of(meshes["unworn"])
+    try:
+        return {moment: formed_mesh(mesh, form) for moment, mesh in meshes.items()}
+    except MeshError as error:
+        reporter.warn(f"{error}: worn.msh, points and ParaView files show what is worn alone")
+        return meshes
+
+
+def resultants_at(loads: LoadHistory, increment: int) -> dict[str, float]:
+    """Return the forces and moments of one increment."""
+    return {name: float(getattr(loads, name)[increment]) for name in RESULTANTS}
+
+
+def load_ranges(loads: LoadHistory) -> dict[str, dict[str, float]]:
+    """Return the least and largest forces in a cycle, with increments counted from 1."""
+    ranges = {}
+    for name in FORCES:
+        force = getattr(loads, name)
+        least, largest = int(np.argmin(force)), int(np.argmax(force))
+        ranges[name] = {
+            "least": float(force[least]),
+            "least_at": least + 1,
+            "largest": float(force[largest]),
+            "largest_at": largest + 1,
+        }
+    return ranges
+
+
+def _mesh_summary(body: Body) -> dict[str, Any]:
+    """Return the number and sizes of elements, and the quality of the worst one."""
+    sizes = element_sizes(body.mesh)
+    ends = {"smallest": sizes.min(), "median": np.median(sizes), "largest": sizes.max()}
+    return {
+        "elements": len(sizes),
+        "size": {name: float(size) for name, size in ends.items()},
+        "worst_quality": float(radius_ratios(body.mesh).min()),
+    }
+
+
+def nonlinearity_sentence(check: NonlinearCheck) -> str:
+    """Return a sentence on the effect of geometric nonlinearity at peak load."""
+    force, moment = (float(np.abs(part).max()) for part in np.split(check.change, [3], axis=1))
+    return (
+        f"geometric nonlinearity at peak load moves P and Q by {force:.2%} of P, moments by "
+        f"{moment:.2%} of P x half a face, slips by {check.slip_change:.1%} of the largest"
+    )
+
+
+def nonlinearity_summary(stage: StructureLoads) -> dict[str, Any]:
+    """Return the stiffness used and, if requested, the results of the total Lagrangian check."""
+    chosen = stage.model.nonlinearity
+    if not chosen.check:
+        return {"stiffness": chosen.stiffness}
+    check = stage.nonlinear_check
+    names = [interface.name for interface in stage.mesh.interfaces]
+    return {
+        "stiffness": chosen.stiffness,
+        "change": {
+            name: dict(zip(RESULTANTS, row.tolist(), strict=True))
+            for name, row in zip(names, check.change, strict=True)
+        },
+        **{name: float(getattr(check, name)) for name in MEASURES},
+        "iterations": check.iterations,
+        "residual": check.residual,
+    }

@@ -1,0 +1,1 @@
+"""Cases and their numbers as text: templates, schemas, error messages and reports."""

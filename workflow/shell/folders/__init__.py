@@ -1,0 +1,1 @@
+"""Run folders on disk: locks, checkpoints, stored steps and the cache."""

@@ -1,0 +1,226 @@
+"""Storage of the steps of a run on disk, from which an interrupted run resumes.
+
+Finished steps are appended to files of ``jumps``, each with some seconds of work. The checkpoint
+ties these files together and holds the states that marches have reached. A resumed run executes its
+code from the start, but reads the results of finished steps instead of computing them. Warm starts,
+caches and counters therefore develop as before, and the first computed step starts from the same
+state as in the interrupted run. The result of a new step is returned as it would be read from disk,
+including its memory order.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import numpy as np
+
+from workflow.case.text.plain import counted
+from workflow.errors import UserError
+from workflow.shell.analysis import Run
+from workflow.shell.folders import checkpoint
+from workflow.shell.folders.checkpoint import StoredState
+from workflow.shell.folders.packing import PackingError, packed, unpacked
+from workflow.shell.folders.store import read_arrays, write_arrays
+
+T = TypeVar("T")
+# Place of a step: the place of the enclosing step, followed by its number within that step.
+Place = tuple[int, ...]
+
+# Largest share of the time that saving may take; packing takes about as much again.
+SHARE = 0.005
+# Assumed seconds of the first save, so that a run of four seconds stores nothing.
+FIRST_SAVE = 0.02
+# Names of the arrays with the places of steps, the ends of their results, and the results.
+PLACES, ENDS, VALUES = "places", "ends", "values"
+# Attribute of the checkpoint: the number of steps computed so far.
+STEPS = "steps"
+
+
+@contextmanager
+def kept_steps(run: Run[Any]) -> Iterator[RunSteps]:
+    """Yield the steps of a run, which return the stored results of an earlier process first.
+
+    Finished steps are saved however the run ends, unless an error of the disk ends it. Raises
+    UserError if the stored steps are of another version.
+    """
+    steps = RunSteps(run)
+    try:
+        yield steps
+    except OSError:
+        raise
+    except BaseException:
+        steps.save()
+        raise
+    steps.report()
+
+
+class RunSteps:
+    """Steps of a run that are stored on disk: see :class:`sa_solver.steps.Steps`."""
+
+    def __init__(self, run: Run[Any]) -> None:
+        self._folder, self._reporter, self._provenance = run.folder, run.reporter, run.provenance
+        self._files = [] if run.kept is None else list(run.kept.jumps)
+        self._before = 0 if run.kept is None else int(run.kept.attributes[STEPS])
+        self._marches = {} if run.kept is None else _unjoined(run.kept.arrays)
+        self._kept = self._of_files()
+        # Results that are not saved yet, in the order of their steps.
+        self._new: dict[Place, bytes] = {}
+        self._above: Place = ()
+        self._count = self._computed = 0
+        self._going_on = False
+        self._saved, self._cost = time.perf_counter(), FIRST_SAVE
+        if run.kept is not None:
+            run.reporter.say(f"  goes on after {counted(self._before, 'step')}")
+
+    def __call__(self, name: str, step: Callable[[], T]) -> T:
+        place = self._next()
+        if place in self._kept:
+            value: T = self._read(self._kept.pop(place), name)
+            return value
+        warned = len(self._reporter.warnings)
+        self._compute()
+        with self._inside(place):
+            value = step()
+        return self._keep(self._new, place, name, value, warned)
+
+    def march(self, name: str, state: T, advance: Callable[[T], T | None]) -> T:
+        place, number = self._next(), 0
+        if place in self._kept:
+            last: T = self._read(self._kept.pop(place), name)
+            return last
+        warned, marches = len(self._reporter.warnings), self._marches
+        for begun in [begun for begun in marches if begun[:-1] == place]:
+            number, state = begun[-1], self._read(marches[begun], name)
+        while True:
+            self._compute()
+            with self._inside((*place, number)):
+                following = advance(state)
+            if following is None:
+                return self._keep(self._new, place, name, state, warned)
+            number += 1
+            state = self._keep(marches, (*place, number), name, following, warned)
+
+    def report(self) -> None:
+        """Log how many steps this process has computed."""
+        self._reporter.log(f"steps: {self._computed} computed, {self._before} taken as kept")
+
+    def save(self) -> None:
+        """Save the results that are not on disk yet."""
+        if not self._new and not self._marches:
+            return
+        begun = time.perf_counter()
+        if self._new:
+            path = self._folder.jump(len(self._files))
+            self._files.append(write_arrays(path, _joined(self._new)))
+            self._new.clear()
+        steps = {STEPS: self._before + self._computed}
+        state = StoredState(_joined(self._marches), steps, self._files)
+        checkpoint.save(self._folder, state, self._provenance)
+        self._saved = time.perf_counter()
+        self._cost = self._saved - begun
+
+    def _compute(self) -> None:
+        """Tell the reporter, before the first computed step, that earlier ones were restored."""
+        if self._before and not self._going_on:
+            self._going_on = True
+            self._reporter.goes_on()
+
+    # -- places -------------------------------------------------------------------------------
+    def _next(self) -> Place:
+        """Return the place of the next step."""
+        self._count += 1
+        return (*self._above, self._count - 1)
+
+    @contextmanager
+    def _inside(self, place: Place) -> Iterator[None]:
+        """Nest the given steps under ``place``."""
+        outside = self._above, self._count
+        self._above, self._count = place, 0
+        try:
+            yield
+        finally:
+            self._above, self._count = outside
+
+    # -- results of steps ---------------------------------------------------------------------
+    def _keep(self, among: dict[Place, bytes], place: Place, name: str, value: T, warned: int) -> T:
+        """Store the result of a step and its warnings, in place of the steps within it."""
+        begun = time.perf_counter()
+        data, faithful = packed((name, value, self._reporter.warnings[warned:]))
+        inside = place[:-1] if among is self._marches else place
+        for steps in (self._new, self._marches):
+            while steps and _within(last := next(reversed(steps)), inside):
+                del steps[last]
+        among[place] = data
+        self._computed += 1
+        if begun - self._saved > self._cost / SHARE:
+            self.save()
+        seconds = self._reporter.seconds
+        seconds["checkpoints"] = seconds.get("checkpoints", 0.0) + time.perf_counter() - begun
+        if faithful:
+            return value
+        handed_on: T = self._read(data, name)
+        return handed_on
+
+    def _read(self, data: bytes, name: str) -> Any:
+        """Return the result of a step and repeat its warnings. Raises UserError for other steps."""
+        try:
+            written, value, warnings = unpacked(data)
+        except PackingError as error:
+            raise self._of_another_version(error) from error
+        if written != name:
+            raise self._of_another_version(f"{written} in the place of {name}")
+        for line in warnings:
+            self._reporter.warn(line)
+        return value
+
+    def _of_another_version(self, wrong: object) -> UserError:
+        of = f"{self._folder.jumps}: of another version of fretscale"
+        return UserError(f"{of} ({wrong}); {self._folder.again}")
+
+    def _of_files(self) -> dict[Place, bytes]:
+        """Return the stored results of steps.
+
+        Steps within a step whose result is stored are left out, and so are steps of a march before
+        the state that it has reached.
+        """
+        kept: dict[Place, bytes] = {}
+        for number in range(len(self._files)):
+            arrays, _ = read_arrays(self._folder.jump(number))
+            kept |= _unjoined(arrays)
+        reached = {place[:-1]: place for place in self._marches}
+
+        def counts(place: Place) -> bool:
+            above = [place[:length] for length in range(1, len(place))]
+            known = any(step in kept for step in above)
+            return not known and all(reached.get(step) in (None, *above) for step in above)
+
+        return {place: data for place, data in kept.items() if counts(place)}
+
+
+def _within(place: Place, other: Place) -> bool:
+    return place[: len(other)] == other
+
+
+# --- on disk ------------------------------------------------------------------------------------
+
+
+def _joined(steps: Mapping[Place, bytes]) -> dict[str, Any]:
+    """Return the results of steps as arrays, one after the other."""
+    lengths = [len(data) for data in steps.values()]
+    return {
+        PLACES: np.array([".".join(map(str, place)) for place in steps], dtype="S"),
+        ENDS: np.cumsum(lengths, dtype=np.int64),
+        VALUES: np.frombuffer(b"".join(steps.values()), dtype=np.uint8),
+    }
+
+
+def _unjoined(arrays: Mapping[str, Any]) -> dict[Place, bytes]:
+    """Return the results of steps from the arrays of :func:`_joined`."""
+    places = [tuple(map(int, place.split(b"."))) for place in arrays[PLACES].tolist()]
+    ends, values = arrays[ENDS].tolist(), arrays[VALUES].tobytes()
+    spans = pairwise([0, *ends])
+    return {place: values[begin:end] for place, (begin, end) in zip(places, spans, strict=True)}
