@@ -46,7 +46,7 @@ from sa_solver import (
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.transforms import passes as loops
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import vibration_model
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import structure_loads
 from workflow.kinds import load_case
@@ -204,7 +204,7 @@ def _rig(elements: int) -> HarmonicBalance:
         case.write_text((CASES / "rig_harmonic_balance.yaml").read_text(encoding="utf-8"), "utf-8")
         loaded = load_case(case)
         assert isinstance(loaded, VibrationCase)
-        return VibrationModel.of(loaded, Reporter(Path(folder, "run.log"))).problem
+        return vibration_model(loaded, Reporter(Path(folder, "run.log"))).structure.problem
 
 
 def _response(problem: HarmonicBalance, odd: int) -> int:

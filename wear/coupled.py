@@ -229,7 +229,7 @@ class Observer:
     ``CoupledWear`` has an example; the observers of ``fretscale`` write logs and results.
     """
 
-    def stage(self, name: Stage) -> AbstractContextManager[object]:
+    def stage(self, name: str) -> AbstractContextManager[object]:
         """Return a context that is entered while the part ``name`` of a run is computed."""
         return nullcontext()
 

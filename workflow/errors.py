@@ -82,3 +82,7 @@ def exit_code(error: FretscaleError) -> int:
 def one_line(said: object) -> str:
     """Return a text in one line, with single spaces for line breaks and runs of spaces."""
     return " ".join(str(said).split())
+
+
+class ModelWarning(UserWarning):
+    """Warning about a model whose results are computed, but may be wrong."""

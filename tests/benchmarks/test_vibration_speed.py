@@ -30,7 +30,7 @@ from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic.march import PeriodicMarch
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import vibration_model
 from workflow.kinds import load_case
 from workflow.shell.terminal.reporter import Reporter
 
@@ -121,7 +121,7 @@ def contacts(tmp_path_factory: pytest.TempPathFactory) -> HarmonicBalance:
     case = load_case(HERE.parents[1] / "cases" / "rig_harmonic_balance.yaml")
     assert isinstance(case, VibrationCase)
     reporter = Reporter(tmp_path_factory.mktemp("bench") / "run.log")
-    return VibrationModel.of(case, reporter).problem
+    return vibration_model(case, reporter).structure.problem
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from wear.coupled import CoupledState, Observer, Stage
+from wear.coupled import CoupledState, Observer
 from workflow.analyses.wear.checkpoint import restored_state, stored_state
 from workflow.errors import UserError
 from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
@@ -34,7 +34,7 @@ class Progress(Observer):
         self._stream = stream
 
     @contextmanager
-    def stage(self, name: Stage) -> Iterator[None]:
+    def stage(self, name: str) -> Iterator[None]:
         if name != "drift probe":
             self._print(name)
         yield

@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from workflow.models.gaps import AddedGap
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
     from workflow.models.loops import TangentialLoops
+    from workflow.models.rig.rig_model import RigModel
     from workflow.models.structure import StructureLoads
     from workflow.models.structure_model import LoadCycle, Nonlinearity, StructureModel
+    from workflow.models.vibration.model import VibrationModel
+    from workflow.models.vibration.sweep import FrequencySweep
     from workflow.models.wear import WearModel
 
 __all__ = [
@@ -27,16 +30,19 @@ __all__ = [
     "ContactFace",
     "DovetailJoint",
     "DovetailMesh",
+    "FrequencySweep",
     "LegPath",
     "LoadCycle",
     "LoadSource",
     "MeshAssembly",
     "Nonlinearity",
+    "RigModel",
     "StructureLoads",
     "StructureModel",
     "TangentialLoops",
     "TightenedBolt",
     "UncoupledSource",
+    "VibrationModel",
     "Wear",
     "WearModel",
 ]
@@ -50,8 +56,11 @@ __getattr__, __dir__ = lazy_names(
         "gaps": ("AddedGap",),
         "loads": ("ContactFace", "LoadSource", "UncoupledSource"),
         "loops": ("TangentialLoops",),
+        "rig.rig_model": ("RigModel",),
         "structure": ("StructureLoads",),
         "structure_model": ("LoadCycle", "Nonlinearity", "StructureModel"),
+        "vibration.model": ("VibrationModel",),
+        "vibration.sweep": ("FrequencySweep",),
         "wear": ("WearModel",),
     },
 )

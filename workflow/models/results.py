@@ -28,6 +28,13 @@ class Declared(NamedTuple):
     description: str
     dims: tuple[str, ...]
 
+    def variable(self, values: Array, per_length: bool = False) -> xr.Variable:
+        """Return values as a variable; extensive quantities may be ``per_length`` [1/mm]."""
+        import xarray as xr
+
+        unit = f"{self.unit}/mm" if per_length and self.unit in FORCES else self.unit
+        return xr.Variable(self.dims, values, {"units": unit, "long_name": self.description})
+
 
 CELLS = ("x", "y")
 PLANE = ("component", *CELLS)
@@ -169,13 +176,7 @@ class WearResults:
         return self._variable(COORDINATES["cycles"], np.array(self.recorder.cycles))
 
     def _variable(self, declared: Declared, values: Array) -> xr.Variable:
-        import xarray as xr
-
-        unit = declared.unit
-        if self.line and unit in FORCES:
-            unit = f"{unit}/mm"
-        attributes = {"units": unit, "long_name": declared.description}
-        return xr.Variable(declared.dims, values, attributes)
+        return declared.variable(values, self.line)
 
 
 def _both(loads: Sequence[LoadHistory], name: str) -> Array:

@@ -13,6 +13,7 @@ from fe_models.solvers.blas_threads import one_thread
 from sa_solver.errors import InputError
 from wear.contact.interface import FirstContact
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, Observer
+from workflow.errors import ModelWarning
 from workflow.models.contact import Contact, FaceContact, Wear
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
@@ -23,10 +24,6 @@ from workflow.models.structure_model import StructureModel, StructureStore
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-class ModelWarning(UserWarning):
-    """Warning about a model whose results are computed, but may be wrong."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from wear.steps.marching import advance_cycles
 from wear.steps.step_errors import step_errors
 from wear.steps.steppers import ExplicitStepper, HeunStepper
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import structure_numbers, vibration_model
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
 from workflow.analyses.vibration_wear.output.quantities import main_results
@@ -64,7 +64,7 @@ def pads(tmp_path_factory):
     """Return the unworn pads under 75 N at 100 Hz, which makes all of them slide."""
     folder = tmp_path_factory.mktemp("pads")
     reporter = Reporter(folder / "log")
-    unworn = VibrationModel.of(case_in(folder).unworn, reporter)
+    unworn = vibration_model(case_in(folder).unworn, reporter).structure
     reporter.close()
     return WearingPads(unworn, LAWS, 75.0, 100.0)
 
@@ -198,7 +198,7 @@ def test_the_rig_as_own_matrices_wears_as_the_one_built_in(pads, tmp_path):
             np.testing.assert_allclose(depth, expected, atol=allowed * expected.max())
         assert ours.energy == pytest.approx(theirs.energy, rel=allowed)
         (energy, numbers), (wanted, known) = (
-            (each.at(state).energy, each.at(state).model.numbers())
+            (each.at(state).energy, structure_numbers(each.at(state).model))
             for each, state in ((own, ours), (built_in, theirs))
         )
         np.testing.assert_allclose(energy, wanted, atol=allowed * wanted.max())
@@ -271,7 +271,7 @@ def test_flat_pads_wear_evenly_and_stick_as_pads_without_form(pads, unworn, flat
     springs = [law.stiffness, law.stiffness, law.normal_stiffness]
     stuck = np.broadcast_to(np.column_stack(springs), (NODES, 3))[:, :, None] * np.eye(3)
     expected = natural_frequencies(pads.unworn.rig.model, stuck)[0]
-    before, after = (pad_cycle.model.numbers()["stuck"][0] for pad_cycle in (begun, cycle))
+    before, after = (structure_numbers(pad_cycle.model)["stuck"][0] for pad_cycle in (begun, cycle))
     assert after == pytest.approx(expected, rel=1e-9)
     assert before < 0.97 * after
 

@@ -19,10 +19,11 @@ from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.structure import own_laws
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.vibration.figures.shares import joint_states
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import structure_numbers, vibration_model
 from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.errors import UserError
 from workflow.kinds import load_case, parse_case, template
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.pictures.style import STYLE
 from workflow.shell.terminal.reporter import Reporter
 
@@ -49,9 +50,9 @@ LIMIT, KT, STIFF, GAP = 10.0, 3e3, 5e3, 0.01
 MASSES, SPRINGS = np.diag([2e-3, 1e-3]), np.array([[3e3, -2e3], [-2e3, 2e3]])
 
 
-def model_of(folder: Path, text: str, *overrides: str) -> VibrationModel:
+def model_of(folder: Path, text: str, *overrides: str) -> VibratingStructure:
     case = parse_case(text, str(folder / "case.yaml"), overrides)
-    return VibrationModel.of(case, Reporter(folder / "run.log"))
+    return vibration_model(case, Reporter(folder / "run.log")).structure
 
 
 def central_differences(damping, force, frequency, steps=1000, periods=30):
@@ -251,7 +252,7 @@ def test_a_mass_beside_a_body_is_held_by_joints_and_springs(body):
         stiff += spring * np.outer(row, row)
     # The stop is open at rest.
     held = np.sqrt(sl.eigh(stiff, mass, eigvals_only=True)) / (2.0 * np.pi)
-    told = model.numbers()
+    told = structure_numbers(model)
     np.testing.assert_allclose(told["free"], apart, rtol=1e-10)
     np.testing.assert_allclose(told["stuck"], held, rtol=1e-10)
     assert model.problem.solve(90.0, 10.0).converged

@@ -13,7 +13,6 @@ from fe_models.joints.reduction import ReducedModel, load_reduced, save_reduced
 from tests.workflow.vibration.time_scenes import MASS, RIG, STIFF, refused, run
 from wear.joints.law import march_joints
 from workflow.analyses.rig.building import rig_model
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.specimens.model import SpecimensModel
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.memory import memory
@@ -21,6 +20,7 @@ from workflow.analyses.time.rig import motion_of
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case
+from workflow.models.rig.rig_model import RigModel
 from workflow.runs.verify import verify_cases
 from workflow.shell.terminal.reporter import Reporter
 

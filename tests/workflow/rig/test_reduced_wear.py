@@ -28,13 +28,13 @@ from wear.laws import EnergyLaw
 from wear.steps.marching import advance_cycles
 from wear.steps.step_errors import step_errors
 from wear.steps.steppers import HeunStepper
-from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import ReducedWearCase
 from workflow.analyses.vibration_wear.nodes_run import resonance_that_wears
 from workflow.analyses.vibration_wear.pads import WearingPads, worn_model
 from workflow.case.text.writing import dump_case
 from workflow.kinds import parse_case
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import Reporter
 
 # Three by three nodes on springs below a holder that is free along z; see matrices().
@@ -144,7 +144,7 @@ def case_of(folder, *overrides, text=BODY) -> ReducedWearCase:
 
 def pads_of(case, folder, force=None, laws=None):
     reporter = Reporter(folder / "log")
-    unworn: VibrationModel = body_model(case, reporter)
+    unworn: VibratingStructure = body_model(case, reporter)
     reporter.close()
     return WearingPads(unworn, laws or case.laws, force or case.wearing, case.wear.frequency)
 

@@ -12,9 +12,9 @@ from tests.workflow.vibration.time_scenes import MASS, STIFF, linear_rig, recept
 from wear.joints.jenkins import Jenkins
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.memory import memory
-from workflow.analyses.vibration.model import BESIDE
 from workflow.case.text.writing import dump_case
 from workflow.kinds import parse_case
+from workflow.models.vibration.structure import BESIDE
 
 RIG = """\
 title: Rig

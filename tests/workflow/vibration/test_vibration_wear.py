@@ -22,11 +22,11 @@ from wear.steps.step_errors import ErrorControl
 from wear.steps.steppers import first_cycles
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
-from workflow.analyses.vibration.case.load import Driving
 from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.vibrating_contact import VibratingContact
 from workflow.case.text.writing import dump_case
 from workflow.kinds import load_case, parse_case
+from workflow.models.vibration.excitation import Driving
 
 WEAR = """\
 title: Ball that wears

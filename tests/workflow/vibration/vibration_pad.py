@@ -15,9 +15,9 @@ from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.rig import modal_damping
 from sa_solver.types import Array
 from tests.workflow.conftest import invoke
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.vibration import model as vibration_model
 from workflow.kinds import template
+from workflow.models.rig.rig_model import RigModel
 
 SIDE, ROWS = 10.0, 5  # of the pad [mm]
 HEIGHT = 1.5  # of the drive over the pad [mm]

@@ -15,9 +15,9 @@ from workflow.analyses.rig.bodies.reduced_rig import known_rig_model, reduced_ri
 from workflow.analyses.rig.bodies.ring import RingOfSectors
 from workflow.analyses.rig.damping import Damping
 from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
-from workflow.analyses.rig.place_names import PlaceNames, in_a_row
-from workflow.analyses.rig.rig_model import JointEntry, RigModel
+from workflow.analyses.rig.place_names import PlaceNames, in_a_row, place_names_of
 from workflow.analyses.rig.structure import FrictionRig, JointedBody, RowOfMasses, joints_of
+from workflow.models.rig.rig_model import JointEntry, RigModel
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -105,7 +105,7 @@ def _damped(rig: RigModel, damping: Damping | None) -> RigModel:
         return rig
     dashpots: defaultdict[Link, float] = defaultdict(float)
     sector = rig.sector
-    names = rig.place_names if sector is None else PlaceNames(sector.model.names)
+    names = place_names_of(rig) if sector is None else PlaceNames(sector.model.names)
     for number, dashpot in enumerate(damping.dashpots):
         links = names.links(dashpot, f"structure.damping.dashpots.{number}")
         for link in links:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from fe_models.dynamics.rig import Link
 from workflow.analyses.rig.bodies.point_kinds import known, matching
 from workflow.analyses.rig.places import Against, Moved
 from workflow.errors import EntryError
+
+if TYPE_CHECKING:
+    from workflow.models.rig.rig_model import RigModel
 
 
 class PlaceNames:
@@ -77,6 +81,12 @@ class PlaceNames:
 
     def _known(self, name: str | None) -> str | None:
         return None if name is None else self._known_as.get(name, name)
+
+
+def place_names_of(rig: RigModel) -> PlaceNames:
+    """Return the places of a rig as a case names them: masses in a row move along x."""
+    names = [rig.model.names[place] for place in rig.retained]
+    return in_a_row(names) if rig.in_a_row else PlaceNames(names)
 
 
 def in_a_row(masses: Sequence[str]) -> PlaceNames:

@@ -24,12 +24,11 @@ from workflow.case.files.input_files import InputFileError, open_hdf5
 from workflow.case.loading import YAML, CaseFile, outline_of
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 from workflow.case.text.plain import entries
+from workflow.models.rig.names import MODE
 
 if TYPE_CHECKING:
     from fe_models.joints.reduction import ReducedModel
 
-# Names of modal displacements, of whichever body.
-MODE = r"(.* )?mode \d+"
 # Rows of a specimens outline that a rig shows, with their names there.
 OF_SPECIMENS = {
     "structure": "specimens",

@@ -19,7 +19,6 @@ from fe_models.dynamics.transient.impact_hammer import (
 from sa_solver.steps import Steps
 from sa_solver.types import Array
 from workflow.analyses.rig import excitation as given
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint import evolution_curve
 from workflow.analyses.time.joint_model import JointModel
@@ -32,6 +31,7 @@ from workflow.analyses.time.motion import (
 )
 from workflow.analyses.time.outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
 from workflow.errors import MethodFailed
+from workflow.models.rig.rig_model import RigModel
 from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import Reporter
 

@@ -22,11 +22,11 @@ from wear.joints.ageing import (
 from wear.joints.law import march_joints
 from wear.joints.measured.loop_record import MeasuredLoopError
 from wear.joints.measured.measured_loops import measure_loops
-from workflow.analyses.rig.laws import Laws
 from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.outcome import LOOP, PARAMETERS, State, TimeOutcome, loop_curves
 from workflow.errors import MethodFailed, UserError
+from workflow.models.rig.laws import Laws
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 

@@ -12,11 +12,12 @@ from wear.joints.evolution import JointEvolution, WearFunction
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig import joint_evolution as given
 from workflow.analyses.rig.joint_sections import BoucWenJoint, ElasticJoint, Joint
-from workflow.analyses.rig.laws import Law, Laws, LineLaw, law_of, law_of_all, laws_of
+from workflow.analyses.rig.laws import law_of, laws_of
 from workflow.analyses.time.case import TimeCase
 from workflow.analyses.time.outcome import PARAMETERS
 from workflow.analyses.wear.output.loop_table import read_loop_table
 from workflow.errors import UserError
+from workflow.models.rig.laws import Law, Laws, LineLaw, law_of_all
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from fe_models.dynamics.excitation import ExcitationForce
 from fe_models.dynamics.motion import Motion, Start
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from sa_solver.steps import COMPUTED, Steps
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.errors import MethodFailed
+from workflow.models.rig.rig_model import RigModel
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 

@@ -17,7 +17,6 @@ from sa_solver.types import Array
 from wear.joints.ageing import LongTest
 from workflow.analyses.rig import excitation as given
 from workflow.analyses.rig.building import rig_model
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import own_laws
 from workflow.analyses.time.case import Ageing, Integration, RigCase, joules
 from workflow.analyses.time.hammer import run_hammer
@@ -33,6 +32,7 @@ from workflow.analyses.time.motion import (
 )
 from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome, loop_curves
 from workflow.errors import MethodFailed
+from workflow.models.rig.rig_model import RigModel
 from workflow.shell.terminal.reporter import Reporter
 
 # Cycles in a row that must change little before a state is steady: a single one may do so while a

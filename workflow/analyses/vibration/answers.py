@@ -12,16 +12,12 @@ from fe_models.dynamics.curves.forced_response import Accuracy, ResponseBranch
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import accuracy_of, step_control
 from workflow.analyses.vibration.output.harmonics import ANSWER, harmonics_of
 from workflow.analyses.vibration.output.outcome import Answers
-from workflow.analyses.vibration.response import (
-    accuracy_of,
-    accurate,
-    motion_columns,
-    step_control,
-    warn_of_error,
-)
+from workflow.analyses.vibration.response import motion_datasets, warn_of_error
+from workflow.models.vibration.motions import accurate
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import Reporter
 
@@ -34,7 +30,7 @@ TOLD = "phase", "energy_per_cycle", "damping", "slip", "separated"
 
 def answers_under(
     case: VibrationCase,
-    model: VibrationModel,
+    model: VibratingStructure,
     branch: ResponseBranch,
     reporter: Reporter,
     steps: Steps,
@@ -102,9 +98,9 @@ def _message(branch: ResponseBranch, frequency: float, found: tuple[HarmonicSolu
 
 
 def _numbers(
-    model: VibrationModel, branch: ResponseBranch, motion: HarmonicSolution
+    model: VibratingStructure, branch: ResponseBranch, motion: HarmonicSolution
 ) -> dict[str, Any]:
-    columns = motion_columns(model, branch.problem, [motion])
+    columns = motion_datasets(model, branch.problem, [motion])
     assert motion.error is not None
     return {
         "amplitude": float(columns["amplitude"].values[0, -1]),
@@ -118,10 +114,10 @@ def _numbers(
 
 
 def _table(
-    model: VibrationModel, branch: ResponseBranch, motions: list[HarmonicSolution]
+    model: VibratingStructure, branch: ResponseBranch, motions: list[HarmonicSolution]
 ) -> dict[str, Dataset]:
     frequency = np.array([motion.frequency for motion in motions])
-    columns = motion_columns(model, branch.problem, motions)
+    columns = motion_datasets(model, branch.problem, motions)
     errors = np.array([motion.error.largest for motion in motions if motion.error is not None])
     amplitude = columns["amplitude"].values.reshape(-1, len(model.rig.seen))
     seen = Dataset(amplitude, "mm", columns["amplitude"].description)

@@ -18,22 +18,18 @@ from fe_models.dynamics.curves.further_branches import (
 from sa_solver.steps import Steps
 from workflow.analyses.vibration.case.sections import FurtherStart
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import accuracy_of, step_control
 from workflow.analyses.vibration.output.outcome import Curves
-from workflow.analyses.vibration.response import (
-    accuracy_of,
-    amplitude_of,
-    curves_of,
-    progress_along,
-    step_control,
-)
+from workflow.analyses.vibration.response import curves_of, progress_along
 from workflow.analyses.vibration.stability import stability_along
+from workflow.models.vibration.motions import amplitude_of
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import Reporter
 
 
 def further_from(
     case: VibrationCase,
-    model: VibrationModel,
+    model: VibratingStructure,
     start: FurtherStart,
     known: Sequence[ResponseBranch | FurtherBranch],
     reporter: Reporter,
@@ -65,7 +61,7 @@ def further_from(
 
 def _curves(
     case: VibrationCase,
-    model: VibrationModel,
+    model: VibratingStructure,
     branch: FurtherBranch,
     name: str,
     reporter: Reporter,

@@ -12,15 +12,12 @@ from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError
 from sa_solver.steps import Steps
 from wear.joints.periodic.march import SLIP
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import step_control
 from workflow.analyses.vibration.output.outcome import Curves
-from workflow.analyses.vibration.response import (
-    LARGEST_ERROR,
-    amplitudes_of,
-    progress_along,
-    step_control,
-)
+from workflow.analyses.vibration.response import LARGEST_ERROR, progress_along
 from workflow.errors import MethodFailed, UserError
+from workflow.models.vibration.motions import amplitudes_of
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
@@ -31,7 +28,7 @@ STILL = 1e-6
 LEAST_DAMPING = 1e-4
 
 
-def refuse_missing_modes(case: VibrationCase, model: VibrationModel) -> None:
+def refuse_missing_modes(case: VibrationCase, model: VibratingStructure) -> None:
     """Refuse a mode number that the structure does not have, before any curve is followed."""
     for number in () if case.modes is None else case.modes.numbers:
         try:
@@ -43,7 +40,7 @@ def refuse_missing_modes(case: VibrationCase, model: VibrationModel) -> None:
 def mode_of(
     case: VibrationCase,
     number: int,
-    model: VibrationModel,
+    model: VibratingStructure,
     problem: HarmonicBalance,
     reporter: Reporter,
     steps: Steps,
@@ -97,7 +94,7 @@ def _error(motion: ModeMotion) -> float:
     return max(motion.vibration_error, motion.frequency_error, damping)
 
 
-def _columns(model: VibrationModel, motions: tuple[ModeMotion, ...]) -> dict[str, Dataset]:
+def _columns(model: VibratingStructure, motions: tuple[ModeMotion, ...]) -> dict[str, Dataset]:
     def column(values: list[float], unit: str, what: str) -> Dataset:
         return Dataset(np.array(values), unit, what)
 

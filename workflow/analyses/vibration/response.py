@@ -3,51 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
-from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import (
     curve_by_force,
     curve_by_frequency,
     curve_by_phase,
 )
 from fe_models.dynamics.curves.forced_response import (
-    Accuracy,
     ResponseBranch,
     along_force,
-    along_frequency,
-    finer_resolution,
 )
 from fe_models.dynamics.curves.further_branches import FurtherBranch
 from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.periodic.resolution_error import resolution_error
 from sa_solver.steps import Steps
-from sa_solver.types import Array
 from wear.contact.moving import LARGE_STROKE
 from wear.joints.periodic.march import SEPARATED, SLIP
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import accuracy_of, step_control, sweep_of
 from workflow.analyses.vibration.output.harmonics import harmonics_of
 from workflow.analyses.vibration.output.loops import loops_of
 from workflow.analyses.vibration.output.outcome import DIAMETERS, RESONANCE, Curves, Response
 from workflow.analyses.vibration.stability import stability_along
 from workflow.errors import MethodFailed
+from workflow.models.vibration.motions import (
+    amplitude_of,
+    amplitudes_of,
+    declared_columns,
+    motion_columns,
+)
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import FORECAST, Reporter
 
-# Times of a period from which amplitudes are taken. The true amplitude of harmonic 1 is at most
-# 5e-6 larger.
-TIMES = 1024
-# Tolerance on the frequency of the largest amplitude, relative to it.
-RESONANCE_TOLERANCE = 1e-6
 # Error of a motion, due to harmonics and samples, that gives a warning if there is no tolerance.
 LARGEST_ERROR = 0.05
 # Usual number of points of a curve while the frequency or the force grows by a factor of e. It
@@ -55,24 +49,6 @@ LARGEST_ERROR = 0.05
 POINTS, BEGUN = 50, 0.2
 # Reason why a curve may end at a resonance.
 UNBOUNDED = "; without damping what the joints do not hold back has no bound at resonance"
-
-
-def step_control(
-    case: VibrationCase, watch: Callable[[float], None] = lambda parameter: None
-) -> ContinuationControl:
-    """Return the step control of curves that the case asks for; ``watch`` gets each new point."""
-    steps = case.continuation
-    return ContinuationControl(
-        first=steps.first_step,
-        least=steps.shortest_step,
-        most=steps.longest_step,
-        iterations=steps.iterations,
-        max_iterations=steps.most_iterations,
-        max_angle=float(np.degrees(steps.largest_angle)),
-        max_points=steps.most_points,
-        tolerance=steps.tolerance,
-        watch=watch,
-    )
 
 
 def progress_along(
@@ -99,37 +75,17 @@ def progress_along(
     return watch
 
 
-def accuracy_of(case: VibrationCase) -> Accuracy | None:
-    """Return the accuracy of motions that the case asks for, None if the resolution is given."""
-    tolerance = case.resolution.tolerance
-    if tolerance is None:
-        return None
-    allowed = Accuracy(tolerance)
-    return replace(allowed, highest=max(allowed.highest, case.harmonics[-1]))
-
-
 def response_under(
-    case: VibrationCase, model: VibrationModel, force: float, reporter: Reporter, steps: Steps
+    case: VibrationCase, model: VibratingStructure, force: float, reporter: Reporter, steps: Steps
 ) -> tuple[Response, ResponseBranch]:
     """Return the response under a force, and the branch of motions that it was taken from.
 
     Raises MethodFailed where there is no motion at all. A curve that ends before its span does
     gives a warning.
     """
-    accuracy, upward = accuracy_of(case), case.continuation.start == "lower"
-    told = case.amount.told(force)
-    branch = along_frequency(
-        model.problem,
-        force,
-        case.frequencies,
-        upward=upward,
-        control=step_control(case, progress_along(case.frequencies, upward, "Hz", reporter)),
-        accuracy=accuracy,
-        steps=steps,
-    )
-    if not branch.solutions:
-        where = case.amount.under(force)
-        raise MethodFailed(f"no motion {where}: {branch.message}; change frequencies")
+    sweep, told = sweep_of(case), case.amount.told(force)
+    watch = progress_along(sweep.span, sweep.upward, "Hz", reporter)
+    branch = sweep.curve(model, force, steps, watch)
     if branch.message:
         unbounded = UNBOUNDED if model.undamped else ""
         reporter.warn(f"{told}: {branch.message}{unbounded}")
@@ -147,12 +103,9 @@ def response_under(
     if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{told}: no resonance, the largest motion is at an end of the curve")
     reporter.doing(f"{told}: resonance")
-    peak = steps("resonance", lambda: _resonance(model, branch, curves))
-    # The peak may have been found before the resolution was refined.
-    problem = branch.problem.refined(peak.resolution)
-    resonance = steps("accurate resonance", lambda: accurate(problem, peak, accuracy))
+    resonance = sweep.resonance(model, branch, curves["amplitude"].values[:, -1], steps)
     warn_of_stroke(model, f"{told}: at resonance", resonance, reporter)
-    found = problem.refined(resonance.resolution)
+    found = branch.problem.refined(resonance.resolution)
     response = Response(
         force,
         curves,
@@ -183,7 +136,11 @@ def warn_of_error(motion: str, error: float, case: VibrationCase, reporter: Repo
 
 
 def force_sweep(
-    case: VibrationCase, model: VibrationModel, frequency: float, reporter: Reporter, steps: Steps
+    case: VibrationCase,
+    model: VibratingStructure,
+    frequency: float,
+    reporter: Reporter,
+    steps: Steps,
 ) -> Curves:
     """Return the motions at a frequency from the least force of a case to the largest.
 
@@ -226,7 +183,7 @@ def force_sweep(
 
 def backbone_of(
     case: VibrationCase,
-    model: VibrationModel,
+    model: VibratingStructure,
     branch: ResponseBranch,
     reporter: Reporter,
     steps: Steps,
@@ -251,7 +208,7 @@ def backbone_of(
         reporter,
         steps,
     )
-    columns = motion_columns(model, backbone.problem, backbone.solutions)
+    columns = motion_datasets(model, backbone.problem, backbone.solutions)
     resonance = "of phase resonance: what is driven lags the force by 90 degrees"
     datasets = {
         case.amount.name: Dataset(backbone.forces, case.amount.unit, case.amount.description),
@@ -266,7 +223,7 @@ def backbone_of(
 
 def _numbers(
     case: VibrationCase,
-    model: VibrationModel,
+    model: VibratingStructure,
     branch: ResponseBranch,
     curves: Datasets,
     problem: HarmonicBalance,
@@ -295,7 +252,7 @@ def _numbers(
 
 
 def _beside(
-    case: VibrationCase, model: VibrationModel, resonance: HarmonicSolution
+    case: VibrationCase, model: VibratingStructure, resonance: HarmonicSolution
 ) -> dict[str, Any]:
     """Return numbers that only a moving ground, an engine or a ring has."""
     numbers: dict[str, Any] = {}
@@ -311,7 +268,7 @@ def _beside(
 
 
 def curves_of(
-    case: VibrationCase, model: VibrationModel, branch: ResponseBranch | FurtherBranch
+    case: VibrationCase, model: VibratingStructure, branch: ResponseBranch | FurtherBranch
 ) -> dict[str, Dataset]:
     """Return results of structure and joints along a branch, over the frequency."""
     along = "frequency of the force, in the order of the curve"
@@ -319,7 +276,7 @@ def curves_of(
     if case.engine_order is not None:
         speed = case.turning * branch.frequencies
         frequencies["speed"] = Dataset(speed, "rad/s", "of the engine, by its order")
-    return {**frequencies, **motion_columns(model, branch.problem, branch.solutions)}
+    return {**frequencies, **motion_datasets(model, branch.problem, branch.solutions)}
 
 
 def _of_the_last(amplitudes: Dataset) -> Dataset:
@@ -328,56 +285,16 @@ def _of_the_last(amplitudes: Dataset) -> Dataset:
     return Dataset(last, "mm", "half of the way to and fro of what is looked at")
 
 
-def motion_columns(
-    model: VibrationModel, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
+def motion_datasets(
+    model: VibratingStructure, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
 ) -> dict[str, Dataset]:
     """Return results of structure and joints along a curve ``(n,)``, amplitudes ``(n, k)``."""
-
-    def column(of: Callable[[HarmonicSolution], Array | float], unit: str, what: str) -> Dataset:
-        return Dataset(np.array([of(motion) for motion in motions]), unit, what)
-
-    moving = bool(model.driving.ground)
-    seen = "half of the way to and fro of what is seen, the last looked at"
-    relative = f"{seen}, relative to the moving ground" if moving else seen
-    lag = "of harmonic 1 of what is looked at before the force, or before a sine at t = 0"
-    lost = "energy lost in a cycle over 4π times the largest kinetic energy"
-    slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
-    apart = "share of the cycle in which they are apart"
-    beyond = "estimated share of the joints' vibration in harmonics left out"
-    energy = "energy that the joints dissipate in a cycle"
-    absolute = {}
-    if moving:
-        of_all = f"{seen}, that of the ground included"
-        absolute["absolute_amplitude"] = column(
-            lambda motion: amplitudes_of(model, model.driving.absolute(motion)), "mm", of_all
-        )
+    declared = declared_columns(model)
+    columns = motion_columns(model, problem, motions)
     return {
-        "amplitude": column(lambda motion: amplitudes_of(model, motion), "mm", relative),
-        **absolute,
-        "phase": column(lambda motion: _phase(motion, model.rig.seen[-1]), "rad", lag),
-        "energy_per_cycle": column(lambda motion: motion.cycle.dissipated.sum(), "N mm", energy),
-        "damping": column(lambda motion: damping_ratio(problem, motion), "1", lost),
-        "slip": column(lambda motion: model.time_share(motion, SLIP), "1", slips),
-        "separated": column(lambda motion: model.time_share(motion, SEPARATED), "1", apart),
-        "left_out": column(lambda motion: motion.left_out, "1", beyond),
+        name: Dataset(values, declared[name].unit, declared[name].description)
+        for name, values in columns.items()
     }
-
-
-def _phase(solution: HarmonicSolution, seen: Array) -> float:
-    """Return the phase of harmonic 1 relative to a sine, whose coefficient is -i."""
-    first = solution.motion[solution.resolution.harmonics.index(1)] @ seen
-    return float(np.angle(1j * first))
-
-
-def amplitudes_of(model: VibrationModel, solution: HarmonicSolution) -> Array:
-    """Return observed amplitudes ``(k,)``: half of the peak-to-peak displacement [mm]."""
-    seen = replace(solution, motion=solution.motion @ model.rig.seen.T)
-    return np.asarray(0.5 * np.ptp(seen.displacement(TIMES), axis=0))
-
-
-def amplitude_of(model: VibrationModel, solution: HarmonicSolution) -> float:
-    """Return the main observed amplitude [mm]."""
-    return float(amplitudes_of(model, solution)[-1])
 
 
 def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
@@ -408,7 +325,7 @@ def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
 
 
 def warn_of_stroke(
-    model: VibrationModel, told: str, motion: HarmonicSolution, reporter: Reporter
+    model: VibratingStructure, told: str, motion: HarmonicSolution, reporter: Reporter
 ) -> None:
     """Warn if contacts with places slide further than contacts of fixed pairs of nodes may."""
     if not len(model.rig.places):
@@ -423,51 +340,3 @@ def warn_of_stroke(
             f"{told} the pads slide over each other by {stroke:.3g} mm, "
             f"more than {LARGE_STROKE:.0%} of their width: that other nodes meet is neglected"
         )
-
-
-# --- resonance ----------------------------------------------------------------------------------
-
-
-def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) -> HarmonicSolution:
-    """Return the motion with the largest observed amplitude, searched around the largest point.
-
-    Where the curve folds or ends there, this is the largest point itself.
-    """
-    sizes = curves["amplitude"].values[:, -1]
-    place = int(np.argmax(sizes))
-    best = branch.solutions[place]
-    if place in (0, len(sizes) - 1):
-        return best
-    before, after = sorted(branch.frequencies[[place - 1, place + 1]])
-    if not before < best.frequency < after:
-        return best
-
-    def lowness(frequency: float) -> float:
-        solution = branch.problem.solve(frequency, best.force, best)
-        return -float(amplitudes_of(model, solution)[-1]) if solution.converged else 0.0
-
-    search = minimize_scalar(
-        lowness,
-        bounds=(before, after),
-        method="bounded",
-        options={"xatol": RESONANCE_TOLERANCE * best.frequency},
-    )
-    top = branch.problem.solve(float(search.x), best.force, best)
-    return top if top.converged and -search.fun > sizes[place] else best
-
-
-def accurate(
-    problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
-) -> HarmonicSolution:
-    """Return the motion with its error, refined to the accuracy if one is asked for."""
-    while True:
-        error = resolution_error(problem, motion)
-        motion, present = replace(motion, error=error), problem.resolution
-        finer = finer_resolution(present, error, accuracy) if accuracy is not None else None
-        if finer is None:
-            return motion
-        refined = problem.refined(finer)
-        more_accurate = refined.solve(motion.frequency, motion.force, motion)
-        if not more_accurate.converged:
-            return motion
-        problem, motion = refined, more_accurate

@@ -15,7 +15,13 @@ from wear.joints.parameters import JointError
 from workflow.analyses.vibration.answers import answers_under
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.further import further_from
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import (
+    contact_at_rest,
+    diameters,
+    linear_limits,
+    structure_numbers,
+    vibration_model,
+)
 from workflow.analyses.vibration.modes import mode_of, refuse_missing_modes
 from workflow.analyses.vibration.output.harmonics import CURVE, harmonics_along, names_of
 from workflow.analyses.vibration.output.outcome import Curves, Response, VibrationOutcome, trend
@@ -23,6 +29,7 @@ from workflow.analyses.vibration.output.results import write_vibration_output
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.stability import looked_for
 from workflow.errors import UserError
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.analysis import Run
 from workflow.shell.folders.steps import kept_steps
 from workflow.shell.terminal.reporter import Reporter
@@ -49,13 +56,13 @@ def run_vibration(run: Run[VibrationCase]) -> None:
 
 
 def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> VibrationOutcome:
-    model = VibrationModel.of(case, reporter)
+    model = vibration_model(case, reporter).structure
     with reporter.stage("rest and linear limits"):
-        numbers, contact = model.numbers(), model.contact()
+        numbers, contact = structure_numbers(model), contact_at_rest(model)
         _tell_what_is_left_out(case, model, reporter)
-        diameters = model.diameters()
+        by_diameters = diameters(model)
         refuse_missing_modes(case, model)
-        linear = steps("linear limits", lambda: model.linear(case.frequencies))
+        linear = steps("linear limits", lambda: linear_limits(model, case.frequencies))
     responses: list[Response] = []
     backbone = None
     sweeps: list[Curves] = []
@@ -103,11 +110,13 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         tuple(sweeps),
         tuple(modes),
         tuple(further),
-        diameters,
+        by_diameters,
     )
 
 
-def _tell_what_is_left_out(case: VibrationCase, model: VibrationModel, reporter: Reporter) -> None:
+def _tell_what_is_left_out(
+    case: VibrationCase, model: VibratingStructure, reporter: Reporter
+) -> None:
     """Report the parts of records that are left out, and stability that is not computed."""
     for number, share in enumerate(model.driving.left_out):
         reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic left out")

@@ -15,9 +15,9 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.stability.floquet import Floquet, Stability
 from sa_solver.steps import Steps
 from sa_solver.types import Array
-from workflow.analyses.vibration.case.excitation import ExcitationSize
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.models.vibration.amount import ExcitationSize
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import Reporter
 
@@ -45,7 +45,7 @@ class CurveStability:
 NOT_LOOKED_FOR = CurveStability({}, {}, ())
 
 
-def looked_for(case: VibrationCase, model: VibrationModel) -> bool:
+def looked_for(case: VibrationCase, model: VibratingStructure) -> bool:
     """Return whether stability is computed: as the case says, or else where it is cheap."""
     if case.stability == "auto":
         return Floquet(model.problem).cheap
@@ -54,7 +54,7 @@ def looked_for(case: VibrationCase, model: VibrationModel) -> bool:
 
 def stability_along(
     case: VibrationCase,
-    model: VibrationModel,
+    model: VibratingStructure,
     name: str,
     curve: FollowedCurve[Any],
     motions: Sequence[HarmonicSolution],

@@ -10,13 +10,15 @@ from fe_models.dynamics.rig import unit_force
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig.building import rig_model
-from workflow.analyses.rig.rig_model import JointNodes, RigModel
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.rig.place_names import place_names_of
+from workflow.analyses.vibration.model import model_on
 from workflow.analyses.vibration_wear.case import ReducedWearCase
+from workflow.models.rig.rig_model import JointNodes, RigModel
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import Reporter
 
 
-def body_model(case: ReducedWearCase, reporter: Reporter) -> VibrationModel:
+def body_model(case: ReducedWearCase, reporter: Reporter) -> VibratingStructure:
     """Return the body before the first cycle.
 
     Raises UserError for an impossible structure, or for wrong points or areas.
@@ -46,7 +48,7 @@ def body_model(case: ReducedWearCase, reporter: Reporter) -> VibrationModel:
         gap=np.broadcast_to(law.clearance, area.shape),
         area=area,
     )
-    return VibrationModel.on(unworn, rig, law)
+    return model_on(unworn, rig, law).structure
 
 
 def _pressing(case: ReducedWearCase, rig: RigModel, law: FrictionContact) -> Array:
@@ -57,7 +59,7 @@ def _pressing(case: ReducedWearCase, rig: RigModel, law: FrictionContact) -> Arr
     pressed = case.joint.pressed
     if pressed is None:
         return rig.preload(law) / case.joint.normal_load
-    shares = rig.place_names.shared(pressed, "joint.pressed")
+    shares = place_names_of(rig).shared(pressed, "joint.pressed")
     return np.sum([share * unit_force(rig.model, name) for name, share in shares], axis=0)
 
 

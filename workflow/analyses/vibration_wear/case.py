@@ -14,6 +14,7 @@ from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.doubts import AWAY, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency
 from workflow.analyses.rig.joint_sections import FrictionContactJoint, JenkinsJoint, Joint
+from workflow.analyses.rig.place_names import place_names_of
 from workflow.analyses.rig.structure import (
     FrictionRig,
     ReducedBody,
@@ -35,7 +36,7 @@ from workflow.case.source import Source
 from workflow.case.text.plain import entries, plain, times
 
 if TYPE_CHECKING:
-    from workflow.analyses.rig.rig_model import RigModel
+    from workflow.models.rig.rig_model import RigModel
 
 # Rows of the outline of the contact's own case that are shown, with their names here.
 OF_CONTACT = {
@@ -330,7 +331,7 @@ class ReducedWearCase(NodesWearCase):
 
     def _check_contacts(self, rig: RigModel) -> None:
         if self.joint.pressed is not None:
-            rig.place_names.shared(self.joint.pressed, "joint.pressed")
+            place_names_of(rig).shared(self.joint.pressed, "joint.pressed")
         assert rig.nodes is not None
         self.joint.of_points(rig.nodes.names)
 

@@ -23,7 +23,6 @@ from wear.steps.steppers import first_cycles
 from wear.steps.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.vibration.case.load import driving_of
-from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.output.loops import closed
 from workflow.analyses.vibration.output.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearCase
@@ -45,6 +44,7 @@ from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
 from workflow.analyses.wear.translation import wear_of
 from workflow.case.loading import load_case
 from workflow.case.text.plain import counted
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.few_cells import check_cells
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
@@ -118,7 +118,7 @@ class _Description:
         case = self.case.with_joint(load, friction, stiffness)
         resolution = Resolution(case.harmonics, case.resolution.samples)
         problem = self.contact.problem(cycle.sliders, resolution)
-        model = VibrationModel(
+        model = VibratingStructure(
             rig, Jenkins(stiffness, friction, load), problem, self.contact.driving
         )
         error, responses = responses_to_all(case, model, cycle.motion, self.reporter, self.steps)

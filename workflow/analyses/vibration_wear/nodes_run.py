@@ -17,13 +17,12 @@ from wear.contact.nodes import NodalState
 from wear.laws import WearLaw
 from wear.steps.steppers import HeunStepper
 from wear.steps.stepping import ContactFailure
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.model import step_control, structure_numbers, vibration_model
 from workflow.analyses.vibration.output.loops import loop_of
 from workflow.analyses.vibration.output.outcome import Curves
-from workflow.analyses.vibration.response import step_control, warn_of_stroke
+from workflow.analyses.vibration.response import warn_of_stroke
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import (
     FrictionRigWearCase,
@@ -46,6 +45,8 @@ from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
 from workflow.case.loading import load_case
 from workflow.case.text.plain import counted
+from workflow.models.rig.rig_model import RigModel
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
@@ -80,12 +81,12 @@ def wear_nodes(
 
 def _unworn(
     case: FrictionRigWearCase | ReducedWearCase, reporter: Reporter
-) -> tuple[VibrationModel, tuple[WearLaw, WearLaw]]:
+) -> tuple[VibratingStructure, tuple[WearLaw, WearLaw]]:
     """Return the structure before the first cycle, and the wear laws of body 1 and body 2."""
     if isinstance(case, ReducedWearCase):
         return body_model(case, reporter), case.laws
     specimens = load_case(case.structure.specimens, [SpecimensCase])
-    return VibrationModel.of(case.unworn, reporter), specimens.laws
+    return vibration_model(case.unworn, reporter).structure, specimens.laws
 
 
 def resonance_that_wears(case: NodesWearCase, problem: HarmonicBalance) -> HarmonicSolution:
@@ -160,7 +161,7 @@ def _worn_state(
         "work_per_cycle": work_done(problem, motion),
         "damped_per_cycle": energy_lost(problem, motion) - float(cycle.energy.sum()),
         "error": error,
-        **cycle.model.numbers(),
+        **structure_numbers(cycle.model),
     }
     reporter.log(
         f"{cycles:g} cycles: {counted(taken, 'step')}, "

@@ -25,8 +25,8 @@ from wear.joints.periodic.march import PeriodicMarch
 from wear.laws import WearLaw
 from wear.steps.stepping import ContactFailure
 from wear.surfaces import Surfaces
-from workflow.analyses.vibration.case.excitation import FORCE, ExcitationSize
-from workflow.analyses.vibration.model import VibrationModel
+from workflow.models.vibration.amount import FORCE, ExcitationSize
+from workflow.models.vibration.structure import VibratingStructure
 
 # Relative change of a resonance's frequency from one state to the next. Farther away, Newton's
 # method may find another mode.
@@ -43,7 +43,7 @@ class PadCycle:
     that it dissipates its energy (:class:`wear.contact.nodes.NodalCycle`).
     """
 
-    model: VibrationModel
+    model: VibratingStructure
     motion: HarmonicSolution
 
     @property
@@ -122,7 +122,7 @@ class WearingPads:
     the equations of the motion.
     """
 
-    unworn: VibrationModel
+    unworn: VibratingStructure
     laws: tuple[WearLaw, WearLaw]
     force: float
     frequency: float | None
@@ -192,7 +192,7 @@ def _moved_by(motion: HarmonicSolution, mean: Array) -> HarmonicSolution:
     return replace(motion, coefficients=coefficients)
 
 
-def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
+def worn_model(unworn: VibratingStructure, depth: Array) -> VibratingStructure:
     """Return the rig with contacts worn by a ``depth`` ``(j,)`` [mm]: only their law is new."""
     rig, problem = unworn.rig, unworn.problem
     assert isinstance(unworn.law, FrictionContact)
@@ -205,4 +205,4 @@ def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
         problem.resolution,
         problem.receptance,
     )
-    return VibrationModel(replace(rig, gap=rig.gap + depth), law, worn, unworn.driving)
+    return VibratingStructure(replace(rig, gap=rig.gap + depth), law, worn, unworn.driving)

@@ -12,10 +12,10 @@ from wear.steps.marching import advance_cycles
 from wear.steps.steppers import Contact, Stepper
 from wear.worn import State
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.output.outcome import Response
 from workflow.analyses.vibration.response import response_under, warn_of_error
 from workflow.analyses.vibration_wear.output.outcome import WornRig
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import Reporter
 
 # Share of the wear in the work for a state; the rest are the responses in it.
@@ -68,7 +68,7 @@ def _tell(reporter: Reporter, stretch: float, cycles: float) -> None:
 
 def responses_to_all(
     case: VibrationCase,
-    model: VibrationModel,
+    model: VibratingStructure,
     motion: HarmonicSolution,
     reporter: Reporter,
     steps: Steps,

@@ -29,14 +29,14 @@ from wear.contact.drive import Drive
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic.parallel import ParallelSliders
 from wear.steps.stepping import ContactFailure, SlidingCycle, WearingContact, WearState
-from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.vibration.case.load import Driving
 from workflow.analyses.wear.structures.bodies.case import (
     BodiesWearCase,
     Reciprocation,
     WearGrid,
 )
 from workflow.analyses.wear.structures.bodies.source import gap_of
+from workflow.models.rig.rig_model import RigModel
+from workflow.models.vibration.excitation import Driving
 
 # Number of stored contacts: those before and after a step.
 KEPT = 2

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 
 from sa_solver.types import Array
-from wear.coupled import CoupledSettings, CoupledState, Observer, Stage
+from wear.coupled import CoupledSettings, CoupledState, Observer
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.checks.warnings import warn_of_growth, warn_of_instability
@@ -48,7 +48,7 @@ class RunLog(Observer):
     contacts: FaceContacts
     source: LoadSource
 
-    def stage(self, name: Stage) -> AbstractContextManager[object]:
+    def stage(self, name: str) -> AbstractContextManager[object]:
         working = self.source if name == "structural friction" else self.contacts
         return reported_stage(self.run.reporter, working, name, "increments")
 

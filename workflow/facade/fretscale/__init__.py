@@ -16,6 +16,9 @@ Models in Python
     - ``Contact``, ``CoulombFriction``: properties of a contact, and how it is computed.
     - ``Wear``, ``JumpSize``, ``Stop``: how far contacts wear, and in which steps.
     - ``AddedGap``: a profile on top of the form of a face.
+    - ``VibrationModel``: a rig with joints under periodic forces; ``run`` computes its motions.
+    - ``vibration_model``: the model that a vibration case describes.
+    - ``RigModel``, ``FrequencySweep``: the rig, and the frequencies of its motions.
     - ``Observer``, ``Progress``, ``Checkpoint``: objects that are called while a model runs.
 
 Results
@@ -41,6 +44,7 @@ Exceptions
     - ``UserError``: a bad argument, file or folder; ``CaseError`` is derived from it.
     - ``MethodFailed``: a numerical method did not converge.
     - ``OutOfMemory``: the case needs more memory than there is.
+    - ``ModelWarning``: a warning about results of a model that may be wrong.
     - ``NotWritten``: output could not be written, for example because the disk is full.
 
 A case is a file, a dictionary of the same entries, or the result of ``load_case``:
@@ -112,12 +116,19 @@ if TYPE_CHECKING:
     from sa_solver.errors import FretscaleError
     from wear.coupled import JumpSize, Observer, Stop
     from wear.evolution import CoulombFriction
-    from workflow.errors import CaseError, MethodFailed, NotWritten, OutOfMemory, UserError
+    from workflow.errors import (
+        CaseError,
+        MethodFailed,
+        ModelWarning,
+        NotWritten,
+        OutOfMemory,
+        UserError,
+    )
     from workflow.interface.cases import Check, check, load_case
     from workflow.interface.comparing import ComparedResult, Comparison, compare
     from workflow.interface.datasets import Group, Values
     from workflow.interface.fitting import FitResult, FittedParameter, fit
-    from workflow.interface.modelling import wear_model
+    from workflow.interface.modelling import vibration_model, wear_model
     from workflow.interface.observers import Checkpoint, Progress
     from workflow.interface.results import MainResult, Results, open  # noqa: A004
     from workflow.interface.running import run
@@ -126,6 +137,9 @@ if TYPE_CHECKING:
     from workflow.models.dovetail import DovetailJoint, DovetailMesh
     from workflow.models.gaps import AddedGap
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
+    from workflow.models.rig.rig_model import RigModel
+    from workflow.models.vibration.model import VibrationModel
+    from workflow.models.vibration.sweep import FrequencySweep
     from workflow.models.wear import WearModel
 
 __all__ = [
@@ -143,6 +157,7 @@ __all__ = [
     "DovetailMesh",
     "FitResult",
     "FittedParameter",
+    "FrequencySweep",
     "FretscaleError",
     "Group",
     "JumpSize",
@@ -152,16 +167,19 @@ __all__ = [
     "MeshAssembly",
     "MethodFailed",
     "Mission",
+    "ModelWarning",
     "NotWritten",
     "Observer",
     "OutOfMemory",
     "Progress",
     "Results",
+    "RigModel",
     "Stop",
     "TightenedBolt",
     "UncoupledSource",
     "UserError",
     "Values",
+    "VibrationModel",
     "Wear",
     "WearModel",
     "check",
@@ -170,6 +188,7 @@ __all__ = [
     "load_case",
     "open",
     "run",
+    "vibration_model",
     "wear_model",
 ]
 
@@ -189,6 +208,7 @@ __getattr__, __dir__ = lazy_names(
             "CaseError",
             "FretscaleError",
             "MethodFailed",
+            "ModelWarning",
             "NotWritten",
             "OutOfMemory",
             "UserError",
@@ -199,13 +219,16 @@ __getattr__, __dir__ = lazy_names(
         "workflow.interface.fitting": ("FitResult", "FittedParameter", "fit"),
         "workflow.interface.results": ("MainResult", "Results", "open"),
         "workflow.interface.running": ("run",),
-        "workflow.interface.modelling": ("wear_model",),
+        "workflow.interface.modelling": ("vibration_model", "wear_model"),
         "workflow.interface.observers": ("Checkpoint", "Progress"),
         "workflow.models.assembly": ("LegPath", "MeshAssembly", "TightenedBolt"),
         "workflow.models.contact": ("Contact", "Wear"),
         "workflow.models.dovetail": ("DovetailJoint", "DovetailMesh"),
         "workflow.models.gaps": ("AddedGap",),
         "workflow.models.loads": ("ContactFace", "LoadSource", "UncoupledSource"),
+        "workflow.models.rig.rig_model": ("RigModel",),
+        "workflow.models.vibration.model": ("VibrationModel",),
+        "workflow.models.vibration.sweep": ("FrequencySweep",),
         "workflow.models.wear": ("WearModel",),
     },
     within="",

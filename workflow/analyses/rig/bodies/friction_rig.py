@@ -11,9 +11,9 @@ from fe_models.dynamics.ground_motion import Translation, along
 from fe_models.dynamics.rig import RigError, unit_force
 from fe_models.joints.reduction import ReducedModel
 from workflow.analyses.rig.bodies.reduced_rig import AXES, reduced_specimens
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig
 from workflow.errors import UserError
+from workflow.models.rig.rig_model import RigModel
 from workflow.shell.terminal.reporter import Reporter
 
 # Observed displacements of the model; the last one is the main one.

@@ -26,13 +26,13 @@ from workflow.analyses.rig.bodies.stand_in import matrices_by_name, specimen_by_
 from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJoint, Joint
 from workflow.analyses.rig.place_names import PlaceNames, link_along
 from workflow.analyses.rig.places import Moved
-from workflow.analyses.rig.rig_model import JointEntry, JointNodes, RigModel
 from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody, own_laws
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
 from workflow.case.loading import load_case
 from workflow.errors import EntryError, UserError
+from workflow.models.rig.rig_model import JointEntry, JointNodes, RigModel
 from workflow.shell.terminal.reporter import Reporter
 
 AXES = "xyz"

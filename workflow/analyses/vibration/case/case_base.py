@@ -24,20 +24,16 @@ from workflow.analyses.rig.structure import (
     refuse_own_joints,
     refuse_undriven,
 )
-from workflow.analyses.vibration.case.excitation import (
-    FORCE,
-    LEVEL,
-    ExcitationSize,
-    VibrationExcitation,
-)
+from workflow.analyses.vibration.case.excitation import VibrationExcitation
 from workflow.analyses.vibration.case.sections import Continuation, MotionResolution
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case, Title, disagreement, entry, one_of
 from workflow.case.source import Source
 from workflow.case.text.plain import shares
+from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
 
 if TYPE_CHECKING:
-    from workflow.analyses.rig.rig_model import RigModel
+    from workflow.models.rig.rig_model import RigModel
 
 
 class VibrationCaseBase(Case):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -17,6 +16,7 @@ from workflow.case.files.input_files import InputFileError
 from workflow.case.files.table_file import read_table_file
 from workflow.case.sections import Section, Title, disagreement, entry
 from workflow.case.text.plain import counted, shares
+from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
 
 if TYPE_CHECKING:
     from fe_models.dynamics.periodic.record import PeriodicRecord
@@ -33,32 +33,6 @@ TURNED = 2.0 * np.pi
 WHOLE_TURN = 1e-6
 # Share of the largest harmonic of a record, below which a harmonic is rounding.
 NOTHING = 1e-9
-
-
-@dataclass(frozen=True)
-class ExcitationSize:
-    """Factor of the excitation, with its ``name``, ``unit`` and ``description``."""
-
-    name: str
-    unit: str
-    description: str
-
-    @property
-    def receptance(self) -> tuple[str, str]:
-        """Unit of an amplitude divided by the factor, as computed and as shown in figures."""
-        return ("mm/N", "µm/N") if self.unit == "N" else ("mm", "µm")
-
-    def told(self, number: float) -> str:
-        """Return the factor with its unit or name, as text."""
-        return f"{number:g} N" if self.unit == "N" else f"{self.name} {number:g}"
-
-    def under(self, number: float) -> str:
-        """Return the text "under" or "at" this factor, for what happens there."""
-        return f"{'under' if self.unit == 'N' else 'at'} {self.told(number)}"
-
-
-FORCE = ExcitationSize("force", "N", "amplitude of the force")
-LEVEL = ExcitationSize("level", "1", "level by which the excitation is multiplied")
 
 
 def amount_in(numbers: Mapping[str, Any]) -> tuple[ExcitationSize, float]:

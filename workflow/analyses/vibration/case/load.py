@@ -3,70 +3,27 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray
 from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import unit_force
 from sa_solver.types import Array
+from workflow.analyses.rig.place_names import place_names_of
 from workflow.analyses.rig.places import Moved
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.vibration.case.excitation import (
-    FORCE,
-    LEVEL,
-    ExcitationSize,
     GroundDisplacement,
     VibrationExcitation,
     waves_of,
 )
 from workflow.errors import EntryError
+from workflow.models.rig.rig_model import RigModel
+from workflow.models.vibration.amount import LEVEL
+from workflow.models.vibration.excitation import Driving, MovingGround
 
 # Share that rounding leaves of forces which cancel each other.
 CANCELLED = 1e-12
-
-
-@dataclass(frozen=True)
-class MovingGround:
-    """A harmonic of the ground's motion at level 1, along the translation ``rigid`` ``(n,)``.
-
-    ``amplitude`` is a in Re a exp(ikωt) of its displacement [mm], or of its acceleration [mm/s²] if
-    it is ``accelerated``.
-    """
-
-    harmonic: int
-    amplitude: complex
-    accelerated: bool
-    rigid: Array
-
-    def displacement(self, frequency: float) -> complex:
-        """Return the complex displacement [mm] of the ground at a frequency [Hz]."""
-        angular = 2.0 * np.pi * frequency * self.harmonic
-        return -self.amplitude / angular**2 if self.accelerated else self.amplitude
-
-
-@dataclass(frozen=True)
-class Driving:
-    """The periodic ``load`` at level 1 without its static part, and the ``ground`` that moves.
-
-    ``amount`` says whether the load is for 1 N or for level 1. ``left_out`` is, for each record,
-    the share above its highest harmonic.
-    """
-
-    load: PeriodicLoad
-    ground: tuple[MovingGround, ...] = ()
-    amount: ExcitationSize = FORCE
-    left_out: tuple[float, ...] = ()
-
-    def absolute(self, motion: HarmonicSolution) -> HarmonicSolution:
-        """Return a motion with absolute displacements, in place of those relative to the ground."""
-        absolute = motion.motion.copy()
-        for moving in self.ground:
-            row = motion.resolution.harmonics.index(moving.harmonic)
-            absolute[row] += motion.force * moving.displacement(motion.frequency) * moving.rigid
-        return replace(motion, motion=absolute)
 
 
 def driving_of(excitation: VibrationExcitation | None, rig: RigModel, highest: int) -> Driving:
@@ -76,8 +33,7 @@ def driving_of(excitation: VibrationExcitation | None, rig: RigModel, highest: i
     that the rig does not have.
     """
     if excitation is None:
-        # The force is a sine: Re (-i) exp(iωt).
-        return Driving(PeriodicLoad({1: -1j * rig.driven}))
+        return Driving.sine(rig.driven)
     return _driven_by(excitation, rig, highest)
 
 
@@ -131,5 +87,5 @@ def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> 
 
 def _shape(rig: RigModel, place: Moved, key: str) -> Array:
     """Return forces ``(n,)`` of 1 N at a place."""
-    shares = rig.place_names.shared(place, key)
+    shares = place_names_of(rig).shared(place, key)
     return np.sum([share * unit_force(rig.model, name) for name, share in shares], axis=0)

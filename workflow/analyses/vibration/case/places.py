@@ -5,11 +5,11 @@ from __future__ import annotations
 from workflow.analyses.rig.bodies.ring import RingOfSectors
 from workflow.analyses.rig.building import known_rig
 from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig, JointedBody, RowOfMasses
 from workflow.analyses.vibration.case.excitation import VibrationExcitation
 from workflow.analyses.vibration.case.load import driving_of
 from workflow.case.sections import in_its_place
+from workflow.models.rig.rig_model import RigModel
 
 
 def check_places(

@@ -7,7 +7,7 @@ import numpy as np
 from fe_models.dynamics.rig import natural_frequencies
 from fe_models.dynamics.rings.sector import CyclicSector
 from sa_solver.types import Array
-from workflow.analyses.rig.rig_model import MOST_FREQUENCIES
+from workflow.models.rig.rig_model import MOST_FREQUENCIES
 from workflow.shell.output.dataset import Dataset
 
 OF_EACH = "lowest natural frequencies of each number of nodal diameters"

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from workflow.analyses.vibration.case.excitation import ExcitationSize, amount_in, told_in, under_in
+from workflow.analyses.vibration.case.excitation import amount_in, told_in, under_in
 from workflow.analyses.vibration.figures.engine import engine_orders
 from workflow.analyses.vibration.figures.loops import loops
 from workflow.analyses.vibration.figures.modes import modes
@@ -24,6 +24,7 @@ from workflow.analyses.vibration.figures.stability import (
 )
 from workflow.analyses.vibration.figures.states import node_states, pad_states
 from workflow.analyses.vibration.output.outcome import AT, FURTHER, VibrationContents
+from workflow.models.vibration.amount import ExcitationSize
 from workflow.pictures.panels import (
     Figures,
     legend_below,

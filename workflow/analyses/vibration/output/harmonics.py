@@ -12,8 +12,8 @@ from fe_models.dynamics.curves.forced_response import ResponseBranch
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray
 from sa_solver.types import Array
-from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.vibration.output.outcome import RESONANCE, Response
+from workflow.models.rig.rig_model import RigModel
 from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.output.tables import DIGITS, heading, write_table
 from workflow.shell.terminal.reporter import Reporter

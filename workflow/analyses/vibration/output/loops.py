@@ -20,10 +20,10 @@ from wear.joints.jenkins import Jenkins
 from wear.joints.measured.loop_record import MeasuredLoopError
 from wear.joints.measured.measured_loops import measure_loops
 from wear.joints.periodic.march import SLIP, STICK
-from workflow.analyses.rig.laws import grouped
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.output.outcome import Curves
+from workflow.models.rig.laws import grouped
+from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
@@ -35,7 +35,7 @@ REPEATED = 3
 
 def loops_of(
     case: VibrationCase,
-    model: VibrationModel,
+    model: VibratingStructure,
     branch: ResponseBranch,
     reporter: Reporter,
     steps: Steps,
@@ -72,7 +72,7 @@ def _known(problem: HarmonicBalance, frequency: float, near: HarmonicSolution) -
 
 
 def loop_of(
-    model: VibrationModel, motion: HarmonicSolution, load: float, entry: int | None = None
+    model: VibratingStructure, motion: HarmonicSolution, load: float, entry: int | None = None
 ) -> Curves:
     """Return the loop of joints together in a motion, under a normal ``load`` [N].
 
@@ -119,7 +119,7 @@ def closed(values: Array) -> Array:
 
 
 def _slopes(
-    model: VibrationModel,
+    model: VibratingStructure,
     motion: HarmonicSolution,
     displacement: Array,
     force: Array,
@@ -139,7 +139,7 @@ def _slopes(
 
 
 def _stick_slope(
-    model: VibrationModel,
+    model: VibratingStructure,
     motion: HarmonicSolution,
     displacement: Array,
     force: Array,

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
-from workflow.analyses.vibration.case.excitation import LEVEL, amount_in, under_in
+from workflow.analyses.vibration.case.excitation import amount_in, under_in
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.output.outcome import AT, MODES
+from workflow.models.vibration.amount import LEVEL
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, told

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from math import degrees, pi
 from typing import Any
 
-from workflow.analyses.vibration.case.excitation import ExcitationSize
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.output.harmonics import CURVE, write_harmonics
 from workflow.analyses.vibration.output.outcome import (
@@ -29,6 +28,7 @@ from workflow.analyses.vibration.output.outcome import (
 )
 from workflow.analyses.vibration.stability import bifurcation_datasets, columns_for
 from workflow.case.text.plain import counted
+from workflow.models.vibration.amount import ExcitationSize
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import CurveAxis, ResultsWriter, run_results

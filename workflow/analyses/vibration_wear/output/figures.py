@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.vibration.case.excitation import FORCE, LEVEL, ExcitationSize
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.figures.stability import draw_motions, explain_stability
 from workflow.analyses.vibration_wear.output.outcome import (
@@ -26,6 +25,7 @@ from workflow.analyses.vibration_wear.output.outcome import (
     WORN,
     VibrationWearContents,
 )
+from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
 from workflow.pictures.panels import (
     Figures,
     legend_below,

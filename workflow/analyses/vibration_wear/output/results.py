@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from workflow.analyses.vibration.case.excitation import ExcitationSize
 from workflow.analyses.vibration.output.outcome import trend
 from workflow.analyses.vibration.output.results import put_response_curves
 from workflow.analyses.vibration_wear.case import (
@@ -26,6 +25,7 @@ from workflow.analyses.vibration_wear.output.outcome import (
     WornNodes,
     WornRig,
 )
+from workflow.models.vibration.amount import ExcitationSize
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.dataset import Dataset

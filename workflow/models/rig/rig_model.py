@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,14 +15,13 @@ from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
 from fe_models.dynamics.periodic.receptance import RIGID
-from fe_models.dynamics.rig import natural_frequencies
+from fe_models.dynamics.rig import natural_frequencies, unit_force
 from fe_models.dynamics.rings.sector import CyclicSector
 from sa_solver.types import Array, Indices
 from wear.joints.elastic import ElasticLaw
 from wear.joints.friction_contact import FrictionContact
-from workflow.analyses.rig.laws import Laws, grouped
-from workflow.analyses.rig.place_names import PlaceNames, in_a_row
-from workflow.analyses.rig.structure import MODE
+from workflow.models.rig.laws import Laws, grouped
+from workflow.models.rig.names import MODE
 
 # Most natural frequencies that are reported, from the lowest: enough for any row of masses.
 MOST_FREQUENCIES = 20
@@ -95,6 +94,32 @@ class RigModel:
     nodes: JointNodes | None = None
     sector: CyclicSector | None = None
 
+    @classmethod
+    def of(
+        cls,
+        model: DynamicModel,
+        driven: Mapping[str, float],
+        observed: Sequence[str],
+        directions: int = 1,
+    ) -> RigModel:
+        """Return the rig of a model whose displacements have names.
+
+        Parameters
+        ----------
+        model
+            Such as of :func:`fe_models.dynamics.lumped_rig`, or of
+            :func:`fe_models.dynamics.reduced_rig`.
+        driven
+            Forces [N] by the names of their displacements, at an excitation of 1 N.
+        observed
+            Names of the observed displacements, the main one last.
+        directions
+            Directions of each joint: 1, or 3 for contacts.
+        """
+        forces = np.sum([force * unit_force(model, name) for name, force in driven.items()], axis=0)
+        seen = np.array([unit_force(model, name) for name in observed])
+        return cls(model, forces, seen, tuple(observed), directions)
+
     @property
     def linked(self) -> DynamicModel:
         """Model with all points that joints and dashpots may connect, next sector included."""
@@ -143,12 +168,6 @@ class RigModel:
         """Indices ``(p,)`` of displacements of places: all but the modes of reduced bodies."""
         modal = [re.fullmatch(MODE, name) is not None for name in self.model.names]
         return np.flatnonzero(np.logical_not(modal))
-
-    @property
-    def place_names(self) -> PlaceNames:
-        """Places as a case names them: masses in a row move along x."""
-        names = [self.model.names[place] for place in self.retained]
-        return in_a_row(names) if self.in_a_row else PlaceNames(names)
 
     @property
     def stretched(self) -> list[str]:

@@ -1,0 +1,79 @@
+"""Tests of vibration models that are built and run in Python."""
+
+from dataclasses import replace
+
+import fretscale
+import numpy as np
+import pytest
+
+from fe_models.dynamics import Accuracy, Link, Resolution, lumped_rig
+from tests.conftest import CASES
+from wear.joints import Jenkins
+
+MASS, SPRING, RATIO = 1e-3, 1e3, 0.01
+
+
+@pytest.fixture
+def model():
+    """Return a mass on a spring of equal stiffness as its joint, under a small force."""
+    mass = lumped_rig({"m": MASS}, {Link("m"): SPRING}, [[Link("m")]], damping_ratio=RATIO)
+    rig = fretscale.RigModel.of(mass, driven={"m": 1.0}, observed=["m"])
+    law = Jenkins(stiffness=SPRING, friction=0.5, normal_load=20.0)
+    sweep = fretscale.FrequencySweep(140.0, 250.0)
+    return fretscale.VibrationModel(rig, law, (0.1,), sweep, Resolution((1, 3), 64))
+
+
+def test_a_stuck_joint_is_a_spring(model):
+    """The resonance is at sqrt(2 k/m), with amplitude F/(c ω), up to terms of ζ²."""
+    results = model.run()
+    response, angular = results["0.1 N"], np.sqrt(2.0 * SPRING / MASS)
+    damping = 2.0 * RATIO * np.sqrt(SPRING * MASS)
+    assert response.attrs["resonance"] == pytest.approx(angular / (2.0 * np.pi), rel=1e-4)
+    assert response.attrs["amplitude"] == pytest.approx(0.1 / (damping * angular), rel=1e-4)
+    assert response["slip"].max() == 0.0
+    assert response["amplitude"].attrs["units"] == "mm"
+    limit = np.interp(
+        response["frequency"], results["linear"]["frequency"], results["linear"]["stuck"]
+    )
+    np.testing.assert_allclose(response["amplitude"][:, -1], 0.1 * limit, rtol=1e-3)
+
+
+def test_a_sliding_joint_is_a_coulomb_damper(model):
+    """At resonance, force and viscous damping leave 4 µN/π of harmonic 1 to friction."""
+    accurate = replace(model.sweep, accuracy=Accuracy(1e-4))
+    force = 1000.0
+    response = replace(model, forces=(force,), sweep=accurate).run()[f"{force:g} N"]
+    damping = 2.0 * RATIO * np.sqrt(SPRING * MASS)
+    angular = 2.0 * np.pi * response.attrs["resonance"]
+    expected = (force - 4.0 * 10.0 / np.pi) / (damping * angular)
+    assert response.attrs["amplitude"] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_curve_without_resonance_gives_a_warning(model):
+    below = replace(model, sweep=fretscale.FrequencySweep(100.0, 120.0))
+    with pytest.warns(fretscale.ModelWarning, match=r"0\.1 N"):
+        below.run()
+
+
+def test_a_model_vibrates_as_its_case(tmp_path):
+    case = fretscale.load_case(
+        CASES / "rig_two_dof.yaml",
+        forces=["40 N"],
+        backbone=False,
+        force_sweeps=[],
+        stability="none",
+        resolution__harmonics=3,
+        resolution__samples=64,
+    )
+    written = fretscale.run(case, tmp_path / "out", quiet=True)
+    response = fretscale.vibration_model(case).run()["40 N"]
+    for name in ("frequency", "amplitude", "phase", "energy_per_cycle", "slip"):
+        np.testing.assert_array_equal(response[name], written[f"responses/00000/{name}"].values)
+    (numbers,) = written.summary["responses"]
+    assert response.attrs["resonance"] == numbers["resonance"]
+    assert response.attrs["damping"] == numbers["damping"]
+
+
+def test_only_vibration_cases_have_such_a_model():
+    with pytest.raises(fretscale.UserError):
+        fretscale.vibration_model(CASES / "sphere_normal.yaml")

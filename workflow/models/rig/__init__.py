@@ -1,0 +1,1 @@
+"""Vibrating structures with joints, and the laws of their joints."""

@@ -1,0 +1,1 @@
+"""Steady vibration of structures with joints, by harmonic balance."""

@@ -1,0 +1,114 @@
+"""Results of a steady vibration as a tree of labelled arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fe_models.dynamics.curves.forced_response import ResponseBranch
+from fe_models.dynamics.periodic.cycle_energy import damping_ratio
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from sa_solver.types import Array
+from workflow.models.results import Declared
+from workflow.models.vibration.motions import POINT, amplitudes_of, declared_columns
+from workflow.models.vibration.structure import VibratingStructure
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Error of a motion, due to harmonics and samples, that gives a warning.
+LARGEST_ERROR = 0.05
+FREQUENCY = Declared("Hz", "frequency of the force, in the order of the curve", POINT)
+LIMITS = ("frequency",)
+
+
+@dataclass(frozen=True)
+class ForcedResponse:
+    """The motions along a curve under one force, with their columns, and the resonance."""
+
+    branch: ResponseBranch
+    columns: Mapping[str, Array]
+    resonance: HarmonicSolution
+
+    @property
+    def error(self) -> float:
+        """Largest estimated error of a motion, by harmonics and samples."""
+        every = (*self.branch.solutions, self.resonance)
+        return max(motion.error.largest for motion in every if motion.error is not None)
+
+    @property
+    def peaks_inside(self) -> bool:
+        """True if the largest motion of the curve is not at one of its ends."""
+        place = int(np.argmax(self.columns["amplitude"][:, -1]))
+        return place not in (0, len(self.branch.solutions) - 1)
+
+    def faults(self) -> Iterator[str]:
+        """Return what makes the curve or its resonance wrong though all solvers converge."""
+        if self.branch.message:
+            yield self.branch.message
+        if not self.peaks_inside:
+            yield "no resonance: the largest motion is at an end of the curve"
+        if self.error > LARGEST_ERROR:
+            yield (
+                f"the motion has an error of {self.error:.1e}: give an accuracy, or a resolution "
+                "with more harmonics and samples"
+            )
+
+
+@dataclass(frozen=True)
+class VibrationResults:
+    """Results of a structure within a span of frequencies [Hz]: its responses by their names."""
+
+    structure: VibratingStructure
+    frequencies: tuple[float, float]
+    responses: Mapping[str, ForcedResponse]
+
+    def tree(self) -> xr.DataTree:
+        """Return the results as a tree of labelled arrays."""
+        import xarray as xr
+
+        groups = {name: self._response(response) for name, response in self.responses.items()}
+        natural = {f"natural_{name}": of for name, of in self.structure.natural.items()}
+        return xr.DataTree.from_dict(
+            {"/": xr.Dataset(attrs=natural), "linear": self._limits(), **groups}
+        )
+
+    def _limits(self) -> xr.Dataset:
+        """Return the linear limits over the frequency."""
+        import xarray as xr
+
+        limits, amount = self.structure.linear(self.frequencies), self.structure.driving.amount
+        size = f"amplitude of what is looked at over the {amount.name}"
+        unit, _ = amount.receptance
+        values = {
+            "free": (Declared(unit, f"{size}, without the joints", LIMITS), limits.free),
+            "stuck": (Declared(unit, f"{size}, all joints stuck", LIMITS), limits.stuck),
+        }
+        along = Declared("Hz", "frequency of the force", LIMITS).variable(limits.frequency)
+        return xr.Dataset(
+            {name: declared.variable(array) for name, (declared, array) in values.items()},
+            coords={"frequency": along},
+        )
+
+    def _response(self, response: ForcedResponse) -> xr.Dataset:
+        import xarray as xr
+
+        declared, resonance = declared_columns(self.structure), response.resonance
+        branch = response.branch
+        problem = branch.problem.refined(resonance.resolution)
+        return xr.Dataset(
+            {name: declared[name].variable(array) for name, array in response.columns.items()},
+            coords={
+                "frequency": FREQUENCY.variable(branch.frequencies),
+                "place": list(self.structure.rig.labels),
+            },
+            attrs={
+                "resonance": resonance.frequency,
+                "amplitude": float(amplitudes_of(self.structure, resonance)[-1]),
+                "damping": damping_ratio(problem, resonance),
+                "error": response.error,
+            },
+        )
