@@ -60,21 +60,56 @@ class JointNodes:
 
 @dataclass(frozen=True)
 class RigModel:
-    """A vibrating structure with joints of ``directions`` directions.
+    """A vibrating structure with joints, its driven and its observed places.
 
-    ``driven`` ``(n,)`` are the forces of an excitation of 1 N. ``seen`` ``(k, n)`` maps
-    displacements to the observed ones, with ``labels`` ``(k,)``; the last is the main one. Loops
-    are along the joints' direction number ``along``. ``entries`` describe the joints of a case in
-    order, and are empty where a case needs none. Masses ``in_a_row`` move along x.
+    Most rigs are made by :meth:`of`; the other fields describe rigs of a case.
 
-    Two bodies in contact have ``pressing`` ``(n,)``, the forces of a normal load of 1 N (elsewhere
-    the load is the preload of the joints), and ``stretch`` ``(n,)``, which maps displacements to
-    the relative displacement of loops, in place of the joints' mean. Each of their joints has its
-    place ``places`` ``(j, 2)`` on the contact plane [mm], initial ``gap`` ``(j,)`` [mm] and
-    ``area`` ``(j,)`` [mm²]; these are empty elsewhere. ``translations`` are rigid motions with the
-    ground, by direction; ``nodes`` are the joints of a reduced body.
+    Parameters
+    ----------
+    model : DynamicModel
+        Matrices of the structure and the connection of its joints; of a ring, those for nodal
+        diameter 0.
+    driven : array (n,)
+        Forces [N] of an excitation of 1 N.
+    seen : array (k, n)
+        Map from displacements to the observed ones; the last is the main one.
+    labels : tuple of str (k,)
+        Names of the observed displacements.
+    directions : int
+        Directions of each joint: 1, or 3 for contacts.
+    along : int
+        Direction of the joints whose loops are observed.
+    entries : tuple of JointEntry
+        The joints of a case in order, empty where a case needs none.
+    in_a_row : bool
+        Whether the structure is a row of masses, which move along x.
+    pressing : array (n,), optional
+        Forces of a normal load of 1 N on two bodies in contact. Without it the load is the preload
+        of the joints.
+    stretch : array (n,), optional
+        Map from displacements to the relative displacement of loops, in place of the joints' mean.
+    places : array (j, 2)
+        Places [mm] of the joints on the contact plane of two bodies, empty elsewhere.
+    gap, area : array (j,)
+        Initial gap [mm] and area [mm²] of the joints of two bodies, empty elsewhere.
+    translations : mapping of str to Translation
+        Rigid motions with the ground, by direction.
+    nodes : JointNodes, optional
+        The joints of a reduced body.
+    sector : CyclicSector, optional
+        One sector of a ring.
 
-    For a ring, ``sector`` is one sector, and ``model`` is the model for nodal diameter 0.
+    Examples
+    --------
+    Two masses on springs; the joint is at the second one, and the first one is driven:
+
+    >>> import fretscale
+    >>> from fe_models.dynamics import Link, lumped_rig
+    >>> springs = {Link("m1"): 1.3e3, Link("m2", "m1"): 270e3}
+    >>> row = lumped_rig({"m1": 21e-3, "m2": 1.2e-3}, springs, [[Link("m2")]])
+    >>> rig = fretscale.RigModel.of(row, driven={"m1": 1.0}, observed=["m1", "m2"])
+    >>> [round(frequency, 1) for frequency in rig.free()]
+    [38.5, 2454.6]
     """
 
     model: DynamicModel
