@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from workflow.models.gaps import AddedGap
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
     from workflow.models.loops import TangentialLoops
+    from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
     from workflow.models.structure import StructureLoads
     from workflow.models.structure_model import LoadCycle, Nonlinearity, StructureModel
@@ -35,6 +36,7 @@ __all__ = [
     "LoadCycle",
     "LoadSource",
     "MeshAssembly",
+    "MotionModel",
     "Nonlinearity",
     "RigModel",
     "StructureLoads",
@@ -56,6 +58,7 @@ __getattr__, __dir__ = lazy_names(
         "gaps": ("AddedGap",),
         "loads": ("ContactFace", "LoadSource", "UncoupledSource"),
         "loops": ("TangentialLoops",),
+        "rig.motion": ("MotionModel",),
         "rig.rig_model": ("RigModel",),
         "structure": ("StructureLoads",),
         "structure_model": ("LoadCycle", "Nonlinearity", "StructureModel"),

@@ -9,17 +9,15 @@ import numpy as np
 
 from fe_models.dynamics.excitation import ExcitationForce
 from fe_models.dynamics.motion import Motion, Start
-from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
+from fe_models.dynamics.transient.newmark import TimeStepControl
 from sa_solver.steps import COMPUTED, Steps
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.errors import MethodFailed
+from workflow.models.rig.motion import CLOCK, CURVES, LARGEST_ERROR, MotionModel, curves_of
 from workflow.models.rig.rig_model import RigModel
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
-
-# Error by time steps, as a share of the largest displacement, from which a warning is given.
-STEPS_LEAVE = 0.05
 
 
 def step_control(case: RigCase) -> TimeStepControl:
@@ -43,17 +41,16 @@ def motion_of(
     ``reached`` is called at times with the share of the motion that is done. Raises MethodFailed
     for a motion that was not found to its end.
     """
-    law = joint.at(energy)
-    pulled = rig.with_preload(law, force)
-    motion = integrate(rig.model, law, pulled, duration, control, start, steps, reached)
-    if not motion.converged:
-        raise MethodFailed(f"motion at {joules(energy)}: {motion.message}")
-    return motion
+    model = MotionModel(rig, joint.at(energy), force, duration, control, start)
+    try:
+        return model.motion(steps, reached)
+    except MethodFailed as error:
+        raise MethodFailed(f"motion at {joules(energy)}: {error}") from error
 
 
 def warn_of_steps(energy: float, error: float, reporter: Reporter) -> None:
     """Warn where the time steps cause a large error of a motion at an ``energy`` [N mm]."""
-    if error > STEPS_LEAVE:
+    if error > LARGEST_ERROR:
         reporter.warn(
             f"at {joules(energy)} the steps of time leave an error of {error:.1%} of the largest "
             "displacement: lower integration.step"
@@ -74,25 +71,18 @@ def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
 
 def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict[str, Dataset]:
     """Return the curves of a motion."""
-    seen, pull = rig.seen.T, "force of the joint, or the sum of several, resisting"
-    dissipated = motion.energies.joints.sum(axis=1)
-    lost = "energy that the joint has dissipated since the beginning"
-    of_entries = {}
+    values = curves_of(rig, force, motion)
+    curves = {
+        name: Dataset(values[name], declared.unit, declared.description)
+        for name, declared in {"time": CLOCK, **CURVES}.items()
+    }
     if len(rig.entries) > 1:
         moved, pulled = rig.by_entry(motion)
         of_each = "of the joints of each entry of structure.joints"
-        of_entries = {
+        curves |= {
             "joints_displacement": Dataset(moved, "mm", f"mean displacement {of_each}"),
             "joints_force": Dataset(pulled, "N", f"sum of the forces {of_each}, resisting"),
         }
-    return {
-        "time": Dataset(motion.times, "s", "time"),
-        "excitation": Dataset(force.value(motion.times), "N", "force of the excitation"),
-        "displacement": Dataset(motion.displacement @ seen, "mm", "displacements of what is seen"),
-        "acceleration": Dataset(
-            motion.acceleration @ seen, "mm/s^2", "accelerations of what is seen"
-        ),
-        "joint_force": Dataset(rig.loop(motion)[1], "N", pull),
-        **of_entries,
-        "dissipated": Dataset(dissipated, "N mm", lost),
-    }
+        # Tables have the energy last.
+        curves["dissipated"] = curves.pop("dissipated")
+    return curves

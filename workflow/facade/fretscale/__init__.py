@@ -18,6 +18,7 @@ Models in Python
     - ``AddedGap``: a profile on top of the form of a face.
     - ``VibrationModel``: a rig with joints under periodic forces; ``run`` computes its motions.
     - ``vibration_model``: the model that a vibration case describes.
+    - ``MotionModel``: a rig with joints in time; ``run`` integrates its motion under a force.
     - ``RigModel``, ``FrequencySweep``: the rig, and the frequencies of its motions.
     - ``Observer``, ``Progress``, ``Checkpoint``: objects that are called while a model runs.
 
@@ -137,6 +138,7 @@ if TYPE_CHECKING:
     from workflow.models.dovetail import DovetailJoint, DovetailMesh
     from workflow.models.gaps import AddedGap
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
+    from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
     from workflow.models.vibration.model import VibrationModel
     from workflow.models.vibration.sweep import FrequencySweep
@@ -168,6 +170,7 @@ __all__ = [
     "MethodFailed",
     "Mission",
     "ModelWarning",
+    "MotionModel",
     "NotWritten",
     "Observer",
     "OutOfMemory",
@@ -226,6 +229,7 @@ __getattr__, __dir__ = lazy_names(
         "workflow.models.dovetail": ("DovetailJoint", "DovetailMesh"),
         "workflow.models.gaps": ("AddedGap",),
         "workflow.models.loads": ("ContactFace", "LoadSource", "UncoupledSource"),
+        "workflow.models.rig.motion": ("MotionModel",),
         "workflow.models.rig.rig_model": ("RigModel",),
         "workflow.models.vibration.model": ("VibrationModel",),
         "workflow.models.vibration.sweep": ("FrequencySweep",),

@@ -1,0 +1,49 @@
+"""Tests of motions in time that are built and run in Python."""
+
+from dataclasses import replace
+
+import fretscale
+import numpy as np
+import pytest
+
+from fe_models.dynamics import HarmonicForce, Link, TimeStepControl, lumped_rig
+from wear.joints import Jenkins
+
+MASS, SPRING, FORCE, FREQUENCY = 1e-3, 1e3, 10.0, 50.0
+
+
+@pytest.fixture
+def model():
+    """Return a mass on a spring whose joint has no friction, driven for four cycles."""
+    mass = lumped_rig({"m": MASS}, {Link("m"): SPRING}, [[Link("m")]])
+    rig = fretscale.RigModel.of(mass, driven={"m": 1.0}, observed=["m"])
+    law = Jenkins(stiffness=SPRING, friction=0.0, normal_load=20.0)
+    force = HarmonicForce(rig.driven, FORCE, FREQUENCY)
+    return fretscale.MotionModel(rig, law, force, 4.0 / FREQUENCY, TimeStepControl(2e-5))
+
+
+def test_a_free_mass_beats_between_force_and_spring(model):
+    """From rest, x = F (sin ωt - ω/ω0 sin ω0 t) / (k - m ω²)."""
+    motion = model.run()
+    times = motion["time"].values
+    driven, free = 2.0 * np.pi * FREQUENCY, np.sqrt(SPRING / MASS)
+    expected = np.sin(driven * times) - driven / free * np.sin(free * times)
+    expected *= FORCE / (SPRING - MASS * driven**2)
+    off = np.abs(motion["displacement"].values[:, 0] - expected).max() / np.abs(expected).max()
+    assert off < 1.5 * motion.attrs["step_error"] < 1e-2
+    assert motion["dissipated"].values[-1] == 0.0
+    assert motion["acceleration"].attrs["units"] == "mm/s^2"
+
+
+def test_a_sliding_joint_dissipates_what_its_force_moves(model):
+    """Far above its friction, the joint loses 4 µN x of every cycle; energies balance."""
+    rubbing = replace(model, law=replace(model.law, friction=1e-3, stiffness=1e5))
+    motion = rubbing.run()
+    moved = np.abs(np.diff(motion["displacement"].values[:, 0])).sum()
+    assert motion["dissipated"].values[-1] == pytest.approx(0.02 * moved, rel=1e-2)
+    assert motion.attrs["balance_error"] < 1e-2
+
+
+def test_long_steps_give_a_warning(model):
+    with pytest.warns(fretscale.ModelWarning, match="time steps"):
+        replace(model, control=TimeStepControl(2e-3)).run()
