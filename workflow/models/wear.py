@@ -133,7 +133,7 @@ class WearModel:
         Warns
         -----
         ModelWarning
-            A contact reaches the border of its grid, or the structure has an obvious fault.
+            A contact touches the border of its grid, or the structure has an obvious fault.
 
         Raises
         ------
@@ -166,12 +166,8 @@ def _warnings(
     """Return what makes results wrong though all solvers converge."""
     if isinstance(loads, StructureLoads):
         yield from (remark.text for remark in loads.remarks() if remark.is_warning)
-    for contact, found in zip(contacts.stages, first, strict=True):
-        if found.touches_border:
-            yield (
-                f"{contact.name}: the contact reaches the border of its grid, which cuts it off: "
-                f"{contact.remedy}"
-            )
+    pairs = zip(contacts.stages, first, strict=True)
+    yield from (contact.border_warning for contact, found in pairs if found.touches_border)
 
 
 def check_start(start: CoupledState, unworn: CoupledState) -> None:
