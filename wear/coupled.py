@@ -18,6 +18,7 @@ import numpy as np
 
 from sa_solver import checks
 from sa_solver.errors import InputError
+from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array, resultant_change
 from wear.contact.contacts import KINETICS, Contacts
 from wear.contact.face_loads import FaceLoads
@@ -242,6 +243,9 @@ class Observer:
     def jumped(self, before: CoupledState, after: CoupledState) -> None:
         """Handle the end of a jump, after the loads have been updated."""
 
+    def remaining(self, state: CoupledState, jumps: int) -> None:
+        """Handle the estimated number of ``jumps`` that remain after the one to ``state``."""
+
 
 # --- the loop -------------------------------------------------------------------------------------
 
@@ -320,11 +324,18 @@ class CoupledWear:
         """Yield the state after every jump from ``state``, until the run ends or reaches a stop."""
         for observer in self.observers:
             observer.begin(state)
-        while not self.settings.ended(state):
-            before, state = state, self._jump(state)
-            for observer in self.observers:
-                observer.jumped(before, state)
+        while (after := self._advance(state)) is not None:
+            state = after
             yield state
+
+    def run(self, state: CoupledState, steps: Steps = COMPUTED) -> CoupledState:
+        """Return the state at the end of a run from ``state``; its jumps are marched by ``steps``.
+
+        With stored steps, the run resumes from the last state that was stored.
+        """
+        for observer in self.observers:
+            observer.begin(state)
+        return steps.march("jump", state, self._advance)
 
     def jumps_left(self, state: CoupledState) -> int:
         """Return an estimate of the number of jumps that are left.
@@ -352,6 +363,16 @@ class CoupledWear:
             yield
 
     # -- one jump ----------------------------------------------------------------------------------
+    def _advance(self, state: CoupledState) -> CoupledState | None:
+        """Return the state after the next jump, or None if the run has ended."""
+        if self.settings.ended(state):
+            return None
+        after = self._jump(state)
+        for observer in self.observers:
+            observer.jumped(state, after)
+            observer.remaining(after, self.jumps_left(after))
+        return after
+
     def _jump(self, state: CoupledState) -> CoupledState:
         cycles, spent = self._jump_cycles(state), Spent()
         for observer in self.observers:

@@ -155,9 +155,8 @@ class WearModel:
                 warnings.warn(message, ModelWarning, stacklevel=2)
             if start is not None:
                 check_start(start, state)
-                state = contacts.restored(start)
-            *_, end = state, *loop.march(state)
-            return WearResults(recorder, end, unworn, loads.line).tree()
+                state = start
+            return WearResults(recorder, loop.run(state), unworn, loads.line).tree()
 
 
 def _warnings(
