@@ -44,23 +44,19 @@ def reported_stage(reporter: Reporter, working: object, name: str, of: str) -> I
         yield
 
 
-@dataclass
+@dataclass(frozen=True)
 class RunLog(Observer):
     """Log of the loop: times of its parts, progress, and warnings."""
 
     run: Run[WearCase]
     contacts: FaceContacts
     source: LoadSource
-    # First jump that this process computes.
-    _first: int | None = None
 
     def stage(self, name: Stage) -> AbstractContextManager[object]:
         working = self.source if name == "structural friction" else self.contacts
         return reported_stage(self.run.reporter, working, name, "increments")
 
     def jumping(self, state: CoupledState, cycles: float) -> None:
-        if self._first is None:
-            self._first = state.jump
         step = self.run.case.wear.step
         if step.kind == "explicit" and step.fraction is None:
             warn_of_instability(self.contacts.stages, state, cycles, self.run.reporter)
@@ -79,12 +75,11 @@ class RunLog(Observer):
         )
 
     def remaining(self, state: CoupledState, jumps: int) -> None:
-        assert self._first is not None
-        done, reporter = state.jump - self._first, self.run.reporter
-        if state.jump == MANY_JUMPS:
+        reporter, done, total = self.run.reporter, state.jump, state.jump + jumps
+        if done == MANY_JUMPS:
             warn_of_many_jumps(self.run.case.wear, state, jumps, reporter)
-        at = f"jump {state.jump} of about {state.jump + jumps}, {state.cycles[-1]:.4g} cycles"
-        reporter.reached(done / (done + jumps), at)
+        at = f"jump {done} of about {total}, {state.cycles[-1]:.4g} cycles"
+        reporter.reached(done / total, at)
 
 
 @dataclass(frozen=True)
