@@ -9,22 +9,33 @@ progress and the like are left to :class:`Observer` objects.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Generic, Literal, cast
 
 import numpy as np
 
 from sa_solver import checks
 from sa_solver.errors import InputError
+from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array, resultant_change
-from wear.contact.contacts import KINETICS, Contacts
+from wear.contact.contacts import KINETICS, Contacts, WearingContacts
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
 from wear.load_sources import CycleSource
 from wear.steps.steppers import ROUNDING
-from wear.worn import Spent
+from wear.worn import Spent, WornState
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    Worn = TypeVar("Worn", bound=WornState, default=InterfaceState)
+else:
+    from typing import TypeVar
+
+    Worn = TypeVar("Worn", bound=WornState)
 
 AT_STOP = 1e-3
 """Relative tolerance of a stop. A jump that would pass the stop is shortened to end within it."""
@@ -33,6 +44,9 @@ RESPONSE = 0.5
 """Relative change of slips and energies over the share of the load that wear moves across a face:
 on the default two-dimensional dovetail they change by 3 % where 7 % of the load moves.
 """
+
+NOTHING = Spent()
+"""Cost of what is known already."""
 
 Stage = Literal["contact, first cycle", "wear", "drift probe", "structural friction"]
 
@@ -109,8 +123,40 @@ class Stop:
         checks.numbers(self, "depth", "volume", above=0.0)
 
 
+class Schedule(ABC):
+    """Base class of the lengths of the jumps of a run, and of its end."""
+
+    resultants: Literal["constant", "drift", "every"] = "constant"
+    drift: float = 0.0
+    friction: Literal["constant", "evolving"] = "constant"
+
+    @property
+    def automatic(self) -> bool:
+        """True if jumps are as long as the steps of the contacts, which grow."""
+        return False
+
+    @abstractmethod
+    def ended(self, state: CoupledState[Any]) -> bool:
+        """Return whether a run that has reached ``state`` is over."""
+
+    @abstractmethod
+    def next_jump(self, state: CoupledState[Any]) -> float:
+        """Return the cycles of the next jump."""
+
+    @abstractmethod
+    def left(self, state: CoupledState[Any]) -> float:
+        """Return the cycles to the end of the run at the present rates."""
+
+    def share_to_stop(self, before: CoupledState[Any], kinetics: Array) -> float:
+        """Return the share of a jump at which it passed the end, or 1 if it did not.
+
+        ``kinetics`` is the row of kinetics after the jump.
+        """
+        return 1.0
+
+
 @dataclass(frozen=True)
-class CoupledSettings:
+class CoupledSettings(Schedule):
     """Settings of a coupled run: its cycles, its jumps, and when the loads are solved again.
 
     Parameters
@@ -154,8 +200,11 @@ class CoupledSettings:
         checks.choice("resultants", self.resultants, ("constant", "drift", "every"))
         checks.choice("friction", self.friction, ("constant", "evolving"))
 
-    def ended(self, state: CoupledState) -> bool:
-        """Return whether a run that has reached ``state`` is over."""
+    @property
+    def automatic(self) -> bool:
+        return self.jump == JumpSize()
+
+    def ended(self, state: CoupledState[Any]) -> bool:
         stop, reached = self.stop, 1.0 - AT_STOP
         return bool(
             state.cycles[-1] >= self.cycles * (1.0 - ROUNDING)
@@ -163,12 +212,48 @@ class CoupledSettings:
             or (stop.volume is not None and state.volume >= stop.volume * reached)
         )
 
+    def next_jump(self, state: CoupledState[Any]) -> float:
+        """Return the cycles of the next jump, from the requested size at the present rates."""
+        size, left = self.jump, self._left(state)
+        if size.cycles is not None:
+            cycles = size.cycles
+        elif size.depth is not None or size.volume is not None:
+            cycles = _cycles_to(size.depth, size.volume, state)
+        else:
+            cycles = _cycles_of_steps(state.interfaces, left)
+        cycles = min(cycles, self._to_stop(state))
+        return left if cycles > left * (1.0 - ROUNDING) else float(cycles)
+
+    def left(self, state: CoupledState[Any]) -> float:
+        return min(self._left(state), self._to_stop(state))
+
+    def share_to_stop(self, before: CoupledState[Any], kinetics: Array) -> float:
+        stop, share = self.stop, 1.0
+        for limit, then, now in (
+            (stop.depth, before.depth, _depth(kinetics)),
+            (stop.volume, before.volume, _volume(kinetics)),
+        ):
+            if limit is not None and now > limit * (1.0 + AT_STOP):
+                share = min(share, (limit - then) / (now - then))
+        return share
+
+    def _left(self, state: CoupledState[Any]) -> float:
+        """Return the cycles to the last one."""
+        return self.cycles - float(state.cycles[-1])
+
+    def _to_stop(self, state: CoupledState[Any]) -> float:
+        """Return the cycles to the nearest stop at the present rates, at least one."""
+        stop = self.stop
+        depth = None if stop.depth is None else stop.depth - state.depth
+        volume = None if stop.volume is None else stop.volume - state.volume
+        return max(1.0, _cycles_to(depth, volume, state))
+
 
 # --- state and observers --------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class CoupledState:
+class CoupledState(Generic[Worn]):
     """Everything that is needed to resume a run.
 
     Parameters
@@ -190,7 +275,7 @@ class CoupledState:
         Cost of all contact solutions.
     """
 
-    interfaces: tuple[InterfaceState, ...]
+    interfaces: tuple[Worn, ...]
     cycles: Array
     kinetics: Array
     drift: Array
@@ -213,7 +298,9 @@ class CoupledState:
         """Volume that all bodies have lost [mm³]."""
         return _volume(self.kinetics[-1])
 
-    def record(self, cycles: float, contacts: Contacts, drift: float) -> CoupledState:
+    def record(
+        self, cycles: float, contacts: WearingContacts[Worn], drift: float
+    ) -> CoupledState[Worn]:
         """Return the state with a row of kinetics added."""
         return replace(
             self,
@@ -233,21 +320,24 @@ class Observer:
         """Return a context that is entered while the part ``name`` of a run is computed."""
         return nullcontext()
 
-    def begin(self, state: CoupledState) -> None:
+    def begin(self, state: CoupledState[Any]) -> None:
         """Handle the start of the run from a state, which is unworn or that of an earlier run."""
 
-    def jumping(self, state: CoupledState, cycles: float) -> None:
+    def jumping(self, state: CoupledState[Any], cycles: float) -> None:
         """Handle the start of a jump of ``cycles``, which may be shortened near a stop."""
 
-    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+    def jumped(self, before: CoupledState[Any], after: CoupledState[Any]) -> None:
         """Handle the end of a jump, after the loads have been updated."""
+
+    def remaining(self, state: CoupledState[Any], jumps: int) -> None:
+        """Handle the estimated number of ``jumps`` from ``state`` on, which is worn already."""
 
 
 # --- the loop -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class CoupledWear:
+class CoupledWear(Generic[Worn]):
     """The coupled loop of loads, contacts and wear.
 
     Its methods raise the exceptions of its load source and its contacts.
@@ -257,7 +347,7 @@ class CoupledWear:
     settings
         Length of the run, its jumps, and when the loads are solved again.
     source
-        Source of the loads.
+        Source of the loads; None where the contacts know their own.
     contacts
         The wearing contacts.
     observers
@@ -292,52 +382,67 @@ class CoupledWear:
     4194 cycles, 1.000 um
     """
 
-    settings: CoupledSettings
-    source: CycleSource
-    contacts: Contacts
+    settings: Schedule
+    source: CycleSource | None
+    contacts: WearingContacts[Worn]
     observers: Sequence[Observer] = ()
 
-    def begin(self, unworn: Sequence[FaceLoads]) -> tuple[CoupledState, list[FirstContact]]:
+    def begin(
+        self: CoupledWear[InterfaceState], unworn: Sequence[FaceLoads]
+    ) -> tuple[CoupledState, list[FirstContact]]:
         """Return the state before the first jump, and the contact of the first cycle.
 
         ``unworn`` are the loads of all contacts before any wear.
         """
+        assert isinstance(self.settings, CoupledSettings)
         with self._stage("contact, first cycle"):
-            begun = self.contacts.begin(unworn, self.settings.cycles)
-        interfaces = tuple(unworn_state for unworn_state, _ in begun)
+            begun = self._faces.begin(unworn, self.settings.cycles)
+        spent = sum((first.spent for _, first in begun), Spent())
+        return self.unworn([state for state, _ in begun], spent), [first for _, first in begun]
+
+    def unworn(self, interfaces: Sequence[Worn], spent: Spent = NOTHING) -> CoupledState[Worn]:
+        """Return the state before the first jump, from those of the contacts and their cost."""
         state = CoupledState(
-            interfaces=interfaces,
+            interfaces=tuple(interfaces),
             cycles=np.empty(0),
             kinetics=np.empty((0, len(interfaces), len(KINETICS))),
             drift=np.empty(0),
             solved_resultants=self._probe(interfaces),
             solutions=1,
-            spent=sum((first.spent for _, first in begun), Spent()),
+            spent=spent,
         )
-        return state.record(0.0, self.contacts, 0.0), [first for _, first in begun]
+        return state.record(0.0, self.contacts, 0.0)
 
-    def march(self, state: CoupledState) -> Iterator[CoupledState]:
+    def march(self, state: CoupledState[Worn]) -> Iterator[CoupledState[Worn]]:
         """Yield the state after every jump from ``state``, until the run ends or reaches a stop."""
         for observer in self.observers:
             observer.begin(state)
-        while not self.settings.ended(state):
-            before, state = state, self._jump(state)
-            for observer in self.observers:
-                observer.jumped(before, state)
+        while (after := self._advance(state)) is not None:
+            state = after
             yield state
 
-    def jumps_left(self, state: CoupledState) -> int:
+    def run(self, state: CoupledState[Worn], steps: Steps = COMPUTED) -> CoupledState[Worn]:
+        """Return the state at the end of a run from ``state``; its jumps are marched by ``steps``.
+
+        With stored steps, the run resumes from the last state that was stored.
+        """
+        for observer in self.observers:
+            observer.begin(state)
+        return steps.march("jump", state, self._advance)
+
+    def jumps_left(self, state: CoupledState[Worn]) -> int:
         """Return an estimate of the number of jumps that are left.
 
         All jumps are taken to be as long as the next one, or to go on growing as they have over the
         last half of all jumps so far. Automatic jumps are taken to double until two of them are
         known.
         """
-        if self.settings.ended(state):
+        settings = self.settings
+        if settings.ended(state):
             return 0
-        following, lengths = self._jump_cycles(state), np.diff(state.cycles)
-        count = min(self._left(state), self._to_stop(state)) / following
-        growth = 1.0 if self.settings.jump == JumpSize() else 0.0
+        following, lengths = settings.next_jump(state), np.diff(state.cycles)
+        count = settings.left(state) / following
+        growth = 1.0 if settings.automatic else 0.0
         if back := len(lengths) // 2:
             growth = (following / float(lengths[-back - 1])) ** (1.0 / (back + 1.0)) - 1.0
         if count > 1.0 and growth > 0.0:
@@ -352,18 +457,35 @@ class CoupledWear:
             yield
 
     # -- one jump ----------------------------------------------------------------------------------
-    def _jump(self, state: CoupledState) -> CoupledState:
-        cycles, spent = self._jump_cycles(state), Spent()
+    def _advance(self, state: CoupledState[Worn]) -> CoupledState[Worn] | None:
+        """Return the state after the next jump, or None if the run has ended."""
+        if self.settings.ended(state):
+            return None
+        if self.observers and state.jump:
+            jumps = self.jumps_left(state)
+            for observer in self.observers:
+                observer.remaining(state, jumps)
+        after = self._jump(state)
+        for observer in self.observers:
+            observer.jumped(state, after)
+        return after
+
+    def _jump(self, state: CoupledState[Worn]) -> CoupledState[Worn]:
+        settings, spent = self.settings, Spent()
+        cycles = settings.next_jump(state)
         for observer in self.observers:
             observer.jumping(state, cycles)
         # Steppers treat the last cycles of a run differently, and a stop may end it earlier.
-        left = max(cycles, min(self._left(state), self._to_stop(state)))
+        left = max(cycles, settings.left(state))
+        begun: Sequence[Worn] = state.interfaces
         while True:
             with self._stage("wear"):
-                jumped = self.contacts.jump(self._begun(state, cycles), cycles, left)
+                if settings.automatic:
+                    begun = _in_phase(state.interfaces, cycles)
+                jumped = self.contacts.jump(begun, cycles, left)
             spent = sum((further for _, further in jumped), spent)
             interfaces = tuple(worn for worn, _ in jumped)
-            shorter = cycles * self._share_to_stop(state, interfaces)
+            shorter = cycles * settings.share_to_stop(state, self.contacts.kinetics(interfaces))
             if shorter == cycles or cycles <= 1.0:
                 break
             cycles = left = max(1.0, shorter)
@@ -371,63 +493,29 @@ class CoupledWear:
         state, drift = self._follow_drift(state)
         return state.record(float(state.cycles[-1]) + cycles, self.contacts, drift)
 
-    def _jump_cycles(self, state: CoupledState) -> float:
-        """Return the cycles of the next jump, from the requested size at the present rates."""
-        size, left = self.settings.jump, self._left(state)
-        if size.cycles is not None:
-            cycles = size.cycles
-        elif size.depth is not None or size.volume is not None:
-            cycles = _cycles_to(size.depth, size.volume, state)
-        else:
-            cycles = _cycles_of_steps(state.interfaces, left)
-        cycles = min(cycles, self._to_stop(state))
-        return left if cycles > left * (1.0 - ROUNDING) else float(cycles)
-
-    def _begun(self, state: CoupledState, cycles: float) -> Sequence[InterfaceState]:
-        """Return the states of the contacts at the beginning of a jump of ``cycles``."""
-        automatic = self.settings.jump == JumpSize()
-        return _in_phase(state.interfaces, cycles) if automatic else state.interfaces
-
-    def _left(self, state: CoupledState) -> float:
-        """Return the cycles to the end of the run."""
-        return self.settings.cycles - float(state.cycles[-1])
-
-    def _to_stop(self, state: CoupledState) -> float:
-        """Return the cycles to the nearest stop at the present rates, at least one."""
-        stop = self.settings.stop
-        depth = None if stop.depth is None else stop.depth - state.depth
-        volume = None if stop.volume is None else stop.volume - state.volume
-        return max(1.0, _cycles_to(depth, volume, state))
-
-    def _share_to_stop(self, before: CoupledState, interfaces: Sequence[InterfaceState]) -> float:
-        """Return the share of a jump at which it passed a stop, or 1 if it passed none."""
-        after, stop, share = self.contacts.kinetics(interfaces), self.settings.stop, 1.0
-        for limit, then, now in (
-            (stop.depth, before.depth, _depth(after)),
-            (stop.volume, before.volume, _volume(after)),
-        ):
-            if limit is not None and now > limit * (1.0 + AT_STOP):
-                share = min(share, (limit - then) / (now - then))
-        return share
-
     # -- loads -------------------------------------------------------------------------------------
-    def _follow_drift(self, state: CoupledState) -> tuple[CoupledState, float]:
+    @property
+    def _faces(self) -> Contacts:
+        """The contacts under the loads of the source."""
+        return cast("Contacts", self.contacts)
+
+    def _follow_drift(self, state: CoupledState[Any]) -> tuple[CoupledState[Any], float]:
         """Solve the loads again if their resultants have drifted too far, and return the drift."""
-        settings = self.settings
-        if settings.resultants == "constant":
+        settings, contacts, source = self.settings, self._faces, self.source
+        if source is None or settings.resultants == "constant":
             return state, 0.0
         with self._stage("drift probe"):
             probe = self._probe(state.interfaces)
-        sizes = np.array([contact.grid.size for contact in self.contacts.contacts])
+        sizes = np.array([contact.grid.size for contact in contacts.contacts])
         change = np.abs(resultant_change(probe, state.solved_resultants, sizes))
-        moved = max(self.contacts.moved(state.interfaces))
+        moved = max(contacts.moved(state.interfaces))
         drift = max(float(change.max()), RESPONSE * moved)
         if settings.resultants == "drift" and drift <= settings.drift:
             return state, drift
         with self._stage("structural friction"):
-            depths = self.contacts.nodal_depths(state.interfaces)
-            histories = self.source.worn(depths, self._friction(state.interfaces))
-        followed = self.contacts.follow(state.interfaces, histories)
+            depths = contacts.nodal_depths(state.interfaces)
+            histories = source.worn(depths, self._friction(state.interfaces))
+        followed = contacts.follow(state.interfaces, histories)
         return replace(
             state,
             interfaces=tuple(interface for interface, _ in followed),
@@ -436,13 +524,15 @@ class CoupledWear:
             spent=sum((further for _, further in followed), state.spent),
         ), drift
 
-    def _probe(self, interfaces: Sequence[InterfaceState]) -> Array:
-        return self.source.probe(self.contacts.nodal_depths(interfaces), self._friction(interfaces))
+    def _probe(self, interfaces: Sequence[Any]) -> Array:
+        if self.source is None:
+            return np.empty((0, 6))
+        return self.source.probe(self._faces.nodal_depths(interfaces), self._friction(interfaces))
 
-    def _friction(self, interfaces: Sequence[InterfaceState]) -> list[float] | None:
+    def _friction(self, interfaces: Sequence[Any]) -> list[float] | None:
         """Return the coefficients of friction of the interfaces, or None if they are constant."""
         constant = self.settings.friction == "constant"
-        return None if constant else self.contacts.friction(interfaces)
+        return None if constant else self._faces.friction(interfaces)
 
 
 def _depth(kinetics: Array) -> float:
@@ -455,7 +545,7 @@ def _volume(kinetics: Array) -> float:
     return float(kinetics[:, 2:4].sum(axis=1).sum())
 
 
-def _cycles_of_steps(interfaces: Sequence[InterfaceState], left: float) -> float:
+def _cycles_of_steps(interfaces: Sequence[WornState], left: float) -> float:
     """Return the cycles of a jump as long as the contacts' own steps, out of the ``left`` ones.
 
     Where a contact has done one of two steps that are judged together, the jump ends with the
@@ -469,7 +559,7 @@ def _cycles_of_steps(interfaces: Sequence[InterfaceState], left: float) -> float
     return left / float(max(1.0, np.ceil(left / proposed * (1.0 - ROUNDING))))
 
 
-def _in_phase(interfaces: Sequence[InterfaceState], cycles: float) -> Sequence[InterfaceState]:
+def _in_phase(interfaces: Sequence[Worn], cycles: float) -> Sequence[Worn]:
     """Return the contacts before a jump of ``cycles``, so that all end a pair of steps with it.
 
     Where some contacts have done one of two steps, the others take two steps in this jump. Out of
@@ -486,7 +576,7 @@ def _in_phase(interfaces: Sequence[InterfaceState], cycles: float) -> Sequence[I
     ]
 
 
-def _cycles_to(depth: float | None, volume: float | None, state: CoupledState) -> float:
+def _cycles_to(depth: float | None, volume: float | None, state: CoupledState[Any]) -> float:
     """Return the cycles in which the present rates wear so much more, infinite without wear.
 
     ``depth`` is that of the fastest wearing body [mm], ``volume`` that of all bodies [mm³].

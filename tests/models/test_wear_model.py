@@ -145,7 +145,7 @@ def test_a_contact_at_the_border_is_warned_of(model):
 
     still = fretscale.Wear(cycles=10.0, motion="neglect")
     small = fretscale.WearModel(Small(), model.contacts, still)
-    with pytest.warns(UserWarning, match="pad: the contact reaches the border of its grid"):
+    with pytest.warns(UserWarning, match="pad: the contact touches the border of its grid"):
         small.run()
 
 

@@ -1,22 +1,79 @@
-"""The contacts of all interfaces of a structure, as the coupled loop uses them."""
+"""Contacts as the coupled loop uses them: those of all interfaces of a structure, or just one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, TypeVar
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceContact, InterfaceState
+from wear.steps.marching import advance_cycles
+from wear.steps.steppers import Contact, Stepper
 from wear.steps.stepping import failures_of
-from wear.worn import Spent
+from wear.worn import Spent, State, WornState
 
 KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
 """Columns of the kinetics of one interface, in mm, mm³ and N mm."""
 
 Same = TypeVar("Same")
+
+
+class WearingContacts(Protocol[State]):
+    """Protocol of contacts that wear together."""
+
+    def jump(
+        self, states: Sequence[State], cycles: float, left: float
+    ) -> list[tuple[State, Spent]]:
+        """Wear ``cycles`` of the ``left`` cycles of the run; return the states and their costs."""
+        ...
+
+    def kinetics(self, states: Sequence[State]) -> Array:
+        """Return a row of :data:`KINETICS` for every contact ``(contacts, 5)``."""
+        ...
+
+
+@dataclass(frozen=True)
+class SoleContact(Generic[State, Contact]):
+    """A contact whose loads and slips follow from its own surfaces.
+
+    Parameters
+    ----------
+    stepper
+        Method and length of its wear steps.
+    contact_at
+        Function that returns the contact in a state.
+    areas
+        Area of each cell, or of each node ``(n,)`` [mm²].
+    steps
+        Source of the wear steps: computed, or stored earlier.
+    reached
+        Callback after each wear step, with the cycles of the jump and those done.
+    """
+
+    stepper: Stepper[State, Contact]
+    contact_at: Callable[[State], Contact]
+    areas: Array | float
+    steps: Steps = COMPUTED
+    reached: Callable[[float, float], None] = lambda cycles, done: None
+
+    def jump(
+        self, states: Sequence[State], cycles: float, left: float
+    ) -> list[tuple[State, Spent]]:
+        (state,), reached = states, partial(self.reached, cycles)
+        worn = advance_cycles(
+            self.stepper, state, cycles, left, self.contact_at, self.steps, reached
+        )
+        return [(worn.state, worn.spent)]
+
+    def kinetics(self, states: Sequence[State]) -> Array:
+        (state,) = states
+        return np.array([_kinetics(state, lambda depth: float(np.sum(depth * self.areas)))])
 
 
 class Contacts:
@@ -66,12 +123,14 @@ class Contacts:
 
     def kinetics(self, states: Sequence[InterfaceState]) -> Array:
         """Return a row of :data:`KINETICS` for every interface ``(interfaces, 5)``."""
-        rows = []
-        for contact, state in zip(self.contacts, states, strict=True):
-            depths = state.surfaces.depths
-            volumes = map(contact.volume, depths)
-            rows.append([*(float(depth.max()) for depth in depths), *volumes, state.energy])
-        return np.array(rows)
+        pairs = zip(self.contacts, states, strict=True)
+        return np.array([_kinetics(state, contact.volume) for contact, state in pairs])
 
     def nodal_depths(self, states: Sequence[InterfaceState]) -> list[Array]:
         return [c.nodal_depth(state) for c, state in zip(self.contacts, states, strict=True)]
+
+
+def _kinetics(state: WornState, volume: Callable[[Array], float]) -> list[float]:
+    """Return the columns of :data:`KINETICS` of a contact."""
+    depths = state.surfaces.depths
+    return [*(float(depth.max()) for depth in depths), *map(volume, depths), state.energy]

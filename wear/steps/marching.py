@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic
 
@@ -28,25 +28,6 @@ class SubcyclingStepper(Generic[State, Contact]):
     ) -> WearStep[State]:
         longest, by = self.longest(state, most), self.marched_by
         return advance_cycles(self.stepper, state, longest, left, contact_at, by)
-
-
-def steps(
-    stepper: Stepper[State, Contact],
-    state: State,
-    to_go: Callable[[State, float], float],
-    left: float,
-    contact_at: Callable[[State], Contact],
-) -> Iterator[WearStep[State]]:
-    """Yield the wear steps of a run of ``left`` cycles, until no cycles are left to do.
-
-    ``to_go`` returns the greatest length of the next step, from a state and the cycles done so far,
-    and 0 at the end.
-    """
-    done = 0.0
-    while (most := to_go(state, done)) > 0.0:
-        step = stepper.step(state, most, left - done, contact_at)
-        state, done = step.state, done + step.cycles
-        yield step
 
 
 def rest(cycles: float, done: float) -> float:

@@ -132,17 +132,21 @@ class ExplicitStepper:
         left: float,
         contact_at: Callable[[State], ExplicitContact[State]],
     ) -> WearStep[State]:
-        contact, cycles = contact_at(state), most
+        contact = contact_at(state)
+        return contact.explicit_step(state, self.length(contact, state, most))
+
+    def length(self, contact: ExplicitContact[State], state: State, most: float) -> float:
+        """Return the length of the next step, at most ``most`` [cycles]."""
         if self.fraction is not None:
-            cycles = _stable(contact, state, most, self.fraction)
-        elif self.cycles is not None:
-            limit = contact.stable_cycles(state, self.cycles)
-            if self.cycles > limit:
-                raise StabilityError(
-                    f"steps of {self.cycles:g} cycles are unstable: take at most {limit:.4g} cycles"
-                )
-            cycles = min(most, self.cycles)
-        return contact.explicit_step(state, cycles)
+            return _stable(contact, state, most, self.fraction)
+        if self.cycles is None:
+            return most
+        limit = contact.stable_cycles(state, self.cycles)
+        if self.cycles > limit:
+            raise StabilityError(
+                f"steps of {self.cycles:g} cycles are unstable: take at most {limit:.4g} cycles"
+            )
+        return min(most, self.cycles)
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
+import numpy as np
+
 from wear.coupled import CoupledState, Observer
-from workflow.analyses.wear.checkpoint import restored_state, stored_state
 from workflow.errors import UserError
+from workflow.shell.folders.packing import PackingError, packed, unpacked
 from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
+
+# Name of the array that holds the packed state.
+STATE = "state"
 
 
 class Progress(Observer):
@@ -72,7 +77,8 @@ class Checkpoint(Observer):
         self.path = Path(path)
 
     def jumped(self, before: CoupledState, after: CoupledState) -> None:
-        write_arrays(self.path, *stored_state(after))
+        data, _ = packed(after)
+        write_arrays(self.path, {STATE: np.frombuffer(data, dtype=np.uint8)})
 
     def state(self) -> CoupledState | None:
         """Return the last state written, or None if there is no file.
@@ -82,8 +88,10 @@ class Checkpoint(Observer):
         if not self.path.exists():
             return None
         try:
-            return restored_state(*read_arrays(self.path))
+            arrays, _ = read_arrays(self.path)
+            state: CoupledState = unpacked(arrays[STATE].tobytes())
         except DamagedFile as error:
             raise UserError(str(error)) from error
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, PackingError) as error:
             raise UserError(f"{self.path}: not a state of this version of fretscale") from error
+        return state

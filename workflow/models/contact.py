@@ -254,6 +254,14 @@ class FaceContact(InterfaceContact):
         load = self.settings.drive.pressing(loads, peak)
         return contact.solve(gap, **load, start=None, compliance=None).pressure
 
+    @property
+    def border_warning(self) -> str:
+        """Warning for a contact that is cut off by the border of its grid."""
+        return (
+            f"{self.name}: the contact touches the border of its grid, where it is cut off: "
+            f"{self.remedy}"
+        )
+
     def face_of(self, body: Literal[1, 2]) -> Face:
         """Return the face of one body, with the nodes of that body."""
         return self.face.face(body)

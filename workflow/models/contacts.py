@@ -8,7 +8,6 @@ from functools import partial
 from wear.contact.contacts import Contacts
 from wear.contact.interface import InterfaceState
 from wear.contact.tractions import ContactFields
-from wear.coupled import CoupledState
 from workflow.models.contact import ContactEnd, FaceContact
 from workflow.models.loops import TangentialLoops, WornLoop
 from workflow.models.progress import ReportsProgress
@@ -23,10 +22,6 @@ class FaceContacts(ReportsProgress, Contacts):
     def __init__(self, stages: Sequence[FaceContact]) -> None:
         super().__init__(stages)
         self.stages = list(stages)
-
-    def restored(self, state: CoupledState) -> CoupledState:
-        """Return a stored state, completed by the parts that are not stored."""
-        return state
 
     @property
     def names(self) -> list[str]:

@@ -23,7 +23,6 @@ from wear.contact.interface import FirstContact, InterfaceState
 from wear.contact.link import StructureLink
 from wear.contact.nodes import NodalContact, NodalState
 from wear.contact.tractions import ContactFields, CycleTractions, acting_slip
-from wear.coupled import CoupledState
 from wear.steps.marching import advance_cycles
 from wear.steps.stabilised import StabilisedStepper
 from wear.steps.steppers import first_cycles
@@ -208,9 +207,6 @@ class NodalContacts(FaceContacts):
         # All faces wear together, so the cost counts once.
         return [(face, Spent() if number else spent) for number, face in enumerate(worn)]
 
-    def restored(self, state: CoupledState) -> CoupledState:
-        return replace(state, interfaces=self._found(state.interfaces))
-
     def _contact(self, solution: CycleSolution) -> NodalContact:
         histories = self._cycles.on_faces(solution)
         cycle = StructureCycle(histories, self._friction, self._areas, self._stiffness)
@@ -268,16 +264,6 @@ class NodalContacts(FaceContacts):
                 )
             )
         return tuple(faces)
-
-    def _found(self, states: Sequence[InterfaceState]) -> tuple[InterfaceState, ...]:
-        """Return the states with the worn depth of all nodes, which identifies their cycle."""
-        depth = np.concatenate([state.surfaces.depth for state in states])
-        companions = [state.coarse for state in states if isinstance(state.coarse, InterfaceState)]
-        coarse: Sequence[InterfaceState | None] = [None] * len(states)
-        if companions:
-            coarse = self._found(companions)
-        pairs = zip(states, coarse, strict=True)
-        return tuple(replace(state, start=depth, coarse=other) for state, other in pairs)
 
     def _first_contacts(self, solution: CycleSolution, stable: float) -> list[FirstContact]:
         firsts = []

@@ -130,7 +130,7 @@ class WearModel:
         Warns
         -----
         ModelWarning
-            A contact reaches the border of its grid, or the structure has an obvious fault.
+            A contact touches the border of its grid, or the structure has an obvious fault.
 
         Raises
         ------
@@ -152,9 +152,8 @@ class WearModel:
                 warnings.warn(message, ModelWarning, stacklevel=2)
             if start is not None:
                 check_start(start, state)
-                state = contacts.restored(start)
-            *_, end = state, *loop.march(state)
-            return WearResults(recorder, end, unworn, loads.line).tree()
+                state = start
+            return WearResults(recorder, loop.run(state), unworn, loads.line).tree()
 
 
 def _warnings(
@@ -163,12 +162,8 @@ def _warnings(
     """Return what makes results wrong though all solvers converge."""
     if isinstance(loads, StructureLoads):
         yield from (remark.text for remark in loads.remarks() if remark.is_warning)
-    for contact, found in zip(contacts.stages, first, strict=True):
-        if found.touches_border:
-            yield (
-                f"{contact.name}: the contact reaches the border of its grid, which cuts it off: "
-                f"{contact.remedy}"
-            )
+    pairs = zip(contacts.stages, first, strict=True)
+    yield from (contact.border_warning for contact, found in pairs if found.touches_border)
 
 
 def check_start(start: CoupledState, unworn: CoupledState) -> None:

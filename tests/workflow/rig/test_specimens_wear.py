@@ -126,8 +126,9 @@ class TestLaws:
         def rates(laws, state=None):
             """Return the depths worn in a cycle, and pressure and slip of that cycle."""
             fretted = FrettedPair(pair, laws, conditions)
-            block = fretted.block(state or NodalState.unworn(curved), 0.0)
-            return block.wear, block.contact.normal.pressure, block.contact.cycle_slip
+            state = state or NodalState.unworn(curved)
+            wear, cycle = fretted.contact_at(state).wear(state), fretted.cycle_at(state).contact
+            return np.stack(wear), cycle.normal.pressure, cycle.cycle_slip
 
         return rates
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workflow.analyses.wear.recording import FileRecorder
+from workflow.shell.folders.steps import RunSteps
 from workflow.shell.folders.store import read_arrays
 
 # Seconds within which everything must have ended.
@@ -20,15 +20,16 @@ posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @contextmanager
 def ctrl_c_after_jumps(jumps: int) -> Iterator[None]:
     """Send Ctrl-C to a run in this process once this number of jumps is stored."""
-    keep = FileRecorder.keep
+    keep = RunSteps._keep
 
-    def interrupting(recorder, state):
-        keep(recorder, state)
+    def interrupting(steps, among, place, name, state, warned):
+        state = keep(steps, among, place, name, state, warned)
         if state.jump == jumps:
             raise KeyboardInterrupt
+        return state
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(FileRecorder, "keep", interrupting)
+        patch.setattr(RunSteps, "_keep", interrupting)
         yield
 
 
@@ -48,4 +49,8 @@ def assert_equal(run, reference):
 def jumps_kept(folder: Path) -> int:
     """Return the number of complete jumps in the checkpoint."""
     path = folder / "checkpoint.h5"
-    return len(read_arrays(path)[0]["jumps"]) - 1 if path.exists() else -1
+    if not path.exists():
+        return -1
+    arrays, attributes = read_arrays(path)
+    ended = not arrays["places"].size  # the last step is then the end of the march
+    return int(attributes["steps"]) - ended

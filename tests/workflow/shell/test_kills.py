@@ -126,17 +126,10 @@ def results_of(out: Path) -> dict[str, object]:
 
 
 def counted(out: Path) -> tuple[int, int]:
-    """Return the steps that the last process of a run has computed, and those it has restored.
-
-    For a wear run these are its jumps, each of which is in the log of the process that computed it.
-    """
+    """Return the steps that the last process of a run has computed, and those it has restored."""
     log = (out / "run.log").read_text("utf-8")
-    told = re.findall(r"steps: (\d+) computed, (\d+) taken", log)
-    if told:
-        return int(told[-1][0]), int(told[-1][1])
-    total = int(json.loads((out / "summary.json").read_text("utf-8"))["jumps"])
-    computed = len(re.findall(r" jump \d+: ", re.split(r"^.*resume: ", log, flags=re.M)[-1]))
-    return computed, total - computed
+    *_, (computed, taken) = re.findall(r"steps: (\d+) computed, (\d+) taken", log)
+    return int(computed), int(taken)
 
 
 def kept_in(out: Path) -> int:
@@ -144,8 +137,8 @@ def kept_in(out: Path) -> int:
     path = out / "checkpoint.h5"
     if not path.exists():
         return 0
-    arrays, attributes = read_arrays(path)
-    return len(arrays["cycles"]) - 1 if "cycles" in arrays else int(attributes["steps"])
+    _, attributes = read_arrays(path)
+    return int(attributes["steps"])
 
 
 # --- cut off in this process ----------------------------------------------------------------------
@@ -176,8 +169,7 @@ def cut(command: list[object], number: int) -> None:
             invoke(*command)
 
 
-# The jumps of a wear run are no steps of these: see test_interruption.py.
-EVERY_KIND = ["joint", *(slow(kind) for kind in RUNS if kind not in ("joint", "wear"))]
+EVERY_KIND = ["joint", *(slow(kind) for kind in RUNS if kind != "joint")]
 
 
 @pytest.mark.parametrize("kind", EVERY_KIND)

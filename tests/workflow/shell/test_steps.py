@@ -121,6 +121,36 @@ def test_a_run_can_be_cut_off_again_and_again(every, tmp_path):
     assert cuts == -(-whole[2] // every) - 1
 
 
+def test_states_are_saved_as_time_allows(monkeypatch, tmp_path):
+    """Of short steps some are saved, of long ones each, and the last; the clock is simulated."""
+    now, cost = [0.0], 0.05
+    written: list[int] = []
+
+    def save(folder, state, provenance):
+        now[0] += cost
+        written.append(state.attributes["steps"])
+
+    monkeypatch.setattr(steps.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(steps.checkpoint, "save", save)
+    for seconds, count in ((0.1, 1000), (100.0, 10)):
+        written.clear()
+        run, begun = run_in(new(tmp_path / str(count))), now[0]
+
+        def advance(jump, seconds=seconds, count=count):
+            if jump == count:
+                raise CutOff
+            now[0] += seconds
+            return jump + 1
+
+        with pytest.raises(CutOff), kept_steps(run) as taken_by:
+            taken_by.march("jump", 0, advance)
+        run.reporter.close()
+        assert written[-1] == count
+        assert cost * len(written) <= steps.SHARE * (now[0] - begun) + 2.0 * cost
+        assert seconds * (max(np.diff([0, *written])) - 1) <= cost / steps.SHARE + seconds
+    assert written == [*range(1, 11), 10]
+
+
 def test_steps_of_another_program_are_one_line(tmp_path):
     assert worked(tmp_path, 8) is None
     run = run_in(tmp_path)

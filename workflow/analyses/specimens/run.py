@@ -8,7 +8,9 @@ directions of shear coupled, which the uncoupled method and Masing's rule neglec
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.steps import Steps
 from sa_solver.types import Array, ElasticPair
 from wear.contact.link import LARGEST_RESIDUAL
+from wear.coupled import CoupledState, Observer
 from wear.steps.marching import rest
 from wear.steps.steppers import ExplicitStepper, StabilityError
 from workflow.analyses.specimens.case import SpecimensCase
@@ -55,6 +58,17 @@ SMALL_MOTION = 1e-3
 # Limit on cycle blocks, each of which takes milliseconds: more are most likely an error in the
 # case.
 MOST_BLOCKS = 20_000
+
+
+@dataclass(frozen=True)
+class BlockProgress(Observer):
+    """Progress of the wear under one normal force."""
+
+    reporter: Reporter
+
+    def remaining(self, state: CoupledState[Any], jumps: int) -> None:
+        done, blocks = state.jump, state.jump + jumps
+        self.reporter.reached(done / blocks, f"cycle block {done} of about {blocks}")
 
 
 def run_specimens(run: Run[SpecimensCase]) -> None:
@@ -165,7 +179,7 @@ def _beside(
 def _blocks(
     model: SpecimensModel, conditions: FrettingConditions, reporter: Reporter, steps: Steps
 ) -> Iterator[BlockState]:
-    """Yield the states of a worn pair, up to the end that the case asks for."""
+    """Return the states of a worn pair, up to the end that the case asks for."""
     case = model.case
     step = case.wear.step
     stepper = (
@@ -173,15 +187,15 @@ def _blocks(
         if step.cycles is None
         else ExplicitStepper(cycles=step.cycles)
     )
+
+    def to_go(state: BlockState) -> float:
+        _check(state, conditions, case)
+        return _to_go(case, state)
+
     fretted = FrettedPair(model.pair, case.laws, conditions, steps)
     reporter.doing(f"{conditions.force:g} N: the unworn cycle")
-    states = wear_in_cycle_blocks(fretted, model.face.gap, stepper, partial(_to_go, case))
-    for number, state in enumerate(states):
-        _check(state, number, conditions, case)
-        if number and (left := _to_go(case, state)) > 0.0:
-            blocks = number + left / _block(case, state)
-            reporter.reached(number / blocks, f"cycle block {number} of about {blocks:.0f}")
-        yield state
+    observers = [BlockProgress(reporter)]
+    return wear_in_cycle_blocks(fretted, model.face.gap, stepper, to_go, observers)
 
 
 def _to_go(case: SpecimensCase, state: BlockState) -> float:
@@ -205,9 +219,7 @@ def _block(case: SpecimensCase, state: BlockState) -> float:
     return step.fraction * state.stable_cycles if step.cycles is None else step.cycles
 
 
-def _check(
-    state: BlockState, number: int, conditions: FrettingConditions, case: SpecimensCase
-) -> None:
+def _check(state: BlockState, conditions: FrettingConditions, case: SpecimensCase) -> None:
     """Raise an error unless the state has converged and the run comes to an end."""
     contact, force = state.contact, f"{conditions.force:g} N"
     if not contact.converged:
@@ -226,7 +238,7 @@ def _check(
             "raise it, or load_path.normal_forces"
         )
     # Number of blocks of the run if all are as long as the first one.
-    needed = number or _to_go(case, state) / _block(case, state)
+    needed = state.number or _to_go(case, state) / _block(case, state)
     if needed > MOST_BLOCKS:
         raise UserError(
             f"wear: more than {MOST_BLOCKS} cycle blocks at {force}; lower the wear coefficients, "

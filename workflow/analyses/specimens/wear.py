@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from fe_models.joints.reduced_contact import FrettingConditions, FrettingCycle, ReducedPair
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
+from wear.contact.contacts import SoleContact
 from wear.contact.nodes import NodalContact, NodalState
+from wear.coupled import CoupledState, CoupledWear, Observer, Schedule
 from wear.laws import WearLaw
-from wear.steps.marching import steps
 from wear.steps.steppers import ExplicitStepper
 
 
@@ -20,10 +22,12 @@ from wear.steps.steppers import ExplicitStepper
 class BlockState:
     """A worn pair after a number of ``cycles``, at the start of a cycle block.
 
-    ``state`` has its surfaces and energy, ``contact`` is the cycle on them, ``wear`` ``(2, n)`` the
-    loss of each body in that cycle [mm] and ``stable_cycles`` the longest stable block.
+    ``number`` blocks went before. ``state`` has its surfaces and energy, ``contact`` is the cycle
+    on them, ``wear`` ``(2, n)`` the loss of each body in that cycle [mm] and ``stable_cycles`` the
+    longest stable block.
     """
 
+    number: int
     cycles: float
     state: NodalState
     contact: FrettingCycle
@@ -51,13 +55,14 @@ class PairCycle:
         self._pair, self.contact, self.friction = pair, contact, friction
         self.slip, self.pressure = contact.cycle_slip[None], contact.normal.pressure[None]
         self.areas, self.start = pair.areas, contact.normal.touching
-        self._last: tuple[Array, float] | None = None
+        self._stable: dict[bytes, float] = {}
 
     def stable_cycles(self, depth_per_pressure: Array) -> float:
-        if self._last is None or not np.array_equal(self._last[0], depth_per_pressure):
-            limit = self._pair.stable_cycles(self.contact.normal, depth_per_pressure / self.areas)
-            self._last = depth_per_pressure, limit
-        return self._last[1]
+        known = depth_per_pressure.tobytes()
+        if known not in self._stable:
+            compliance = depth_per_pressure / self.areas
+            self._stable[known] = self._pair.stable_cycles(self.contact.normal, compliance)
+        return self._stable[known]
 
 
 class FrettedPair:
@@ -70,34 +75,64 @@ class FrettedPair:
         conditions: FrettingConditions,
         steps: Steps = COMPUTED,
     ) -> None:
-        self._pair, self._laws, self._conditions = pair, laws, conditions
+        self.pair, self._laws, self._conditions = pair, laws, conditions
         self._steps = steps
         self._last: tuple[NodalState, PairCycle] | None = None
+        self._described: tuple[CoupledState[NodalState], BlockState] | None = None
 
     def cycle_at(self, state: NodalState) -> PairCycle:
         """Return the cycle on the surfaces of ``state``, started from its last contact."""
         if self._last is None or self._last[0].surfaces is not state.surfaces:
             conditions = self._conditions
             guess = None if state.start is None else np.asarray(state.start)
-            gap, cycle = state.surfaces.gap, self._pair.fretting_cycle
+            gap, cycle = state.surfaces.gap, self.pair.fretting_cycle
             contact = self._steps("fretting cycle", lambda: cycle(gap, conditions, guess))
-            self._last = state, PairCycle(self._pair, contact, conditions.friction)
+            self._last = state, PairCycle(self.pair, contact, conditions.friction)
         return self._last[1]
 
     def contact_at(self, state: NodalState) -> NodalContact:
         """Return the contact in a state in the form that wear steps need."""
         return NodalContact(self._laws, (self.cycle_at(state),))
 
-    def block(self, state: NodalState, cycles: float) -> BlockState:
-        """Return the description of a state after a number of cycles."""
-        contact = self.contact_at(state)
-        return BlockState(
-            cycles,
-            state,
-            self.cycle_at(state).contact,
-            np.stack(contact.wear(state)),
-            contact.stable_cycles(state),
-        )
+    def block(self, after: CoupledState[NodalState]) -> BlockState:
+        """Return the description of the state after some jumps."""
+        if self._described is None or self._described[0] is not after:
+            (state,) = after.interfaces
+            contact = self.contact_at(state)
+            self._described = (
+                after,
+                BlockState(
+                    after.jump,
+                    float(after.cycles[-1]),
+                    state,
+                    self.cycle_at(state).contact,
+                    np.stack(contact.wear(state)),
+                    contact.stable_cycles(state),
+                ),
+            )
+        return self._described[1]
+
+
+@dataclass(frozen=True)
+class CycleBlocks(Schedule):
+    """A run in explicit cycle blocks.
+
+    ``to_go`` returns the most cycles that the block after a state may have, and 0 at the end.
+    """
+
+    fretted: FrettedPair
+    stepper: ExplicitStepper
+    to_go: Callable[[BlockState], float]
+
+    def ended(self, state: CoupledState[Any]) -> bool:
+        return not self.left(state) > 0.0
+
+    def next_jump(self, state: CoupledState[Any]) -> float:
+        (worn,) = state.interfaces
+        return self.stepper.length(self.fretted.contact_at(worn), worn, self.left(state))
+
+    def left(self, state: CoupledState[Any]) -> float:
+        return self.to_go(self.fretted.block(state))
 
 
 def wear_in_cycle_blocks(
@@ -105,18 +140,15 @@ def wear_in_cycle_blocks(
     gap: Array,
     stepper: ExplicitStepper,
     to_go: Callable[[BlockState], float],
+    observers: Sequence[Observer] = (),
 ) -> Iterator[BlockState]:
     """Yield states of a contact of unworn ``gap`` ``(n,)`` that frets until nothing is ``to_go``.
 
-    ``to_go`` returns the most cycles that the block after a state may have. Raises
+    ``to_go`` is that of :class:`CycleBlocks`. Raises
     :class:`~wear.steps.steppers.StabilityError` where a block of a given length would be unstable.
     """
-    block = fretted.block(NodalState.unworn(gap), 0.0)
-    yield block
-
-    def most(state: NodalState, done: float) -> float:
-        return to_go(block)
-
-    for step in steps(stepper, block.state, most, np.inf, fretted.contact_at):
-        block = fretted.block(step.state, block.cycles + step.cycles)
-        yield block
+    contact = SoleContact(stepper, fretted.contact_at, fretted.pair.areas)
+    loop = CoupledWear(CycleBlocks(fretted, stepper, to_go), None, contact, observers)
+    state = loop.unworn([NodalState.unworn(gap)])
+    yield fretted.block(state)
+    yield from map(fretted.block, loop.march(state))

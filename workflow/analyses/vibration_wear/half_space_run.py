@@ -72,7 +72,8 @@ def wear_half_space(
         first = first_cycles(contact.wearing(state), state, wear.cycles[-1])
         state = replace(state, next_cycles=first)
     describe = _Description(case, contact, reporter, steps)
-    states = worn_states(wear.cycles, stepper, state, contact.wearing, describe, reporter, steps)
+    of_contact = stepper, state, contact.wearing, contact.grid.cell_area
+    states = worn_states(wear.cycles, *of_contact, describe, reporter, steps)
     return VibrationWearOutcome(case, states, grid=contact.grid)
 
 

@@ -75,7 +75,8 @@ def wear_nodes(
         return worn
 
     stepper = HeunStepper(wear.tolerance)
-    states = worn_states(wear.cycles, stepper, state, pads.contact_at, describe, reporter, steps)
+    of_contact = stepper, state, pads.contact_at, unworn.rig.area
+    states = worn_states(wear.cycles, *of_contact, describe, reporter, steps)
     return VibrationWearOutcome(case, states, nodes=_nodes(unworn.rig))
 
 

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
+from itertools import chain
+from typing import Any
 
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.resolution_error import resolution_error
 from sa_solver.steps import Steps
-from wear.steps.marching import advance_cycles
+from sa_solver.types import Array
+from wear.contact.contacts import SoleContact
+from wear.coupled import CoupledState, CoupledWear, Observer, Schedule
 from wear.steps.steppers import Contact, Stepper
 from wear.worn import State
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
@@ -22,11 +28,44 @@ from workflow.shell.terminal.reporter import Reporter
 WEAR = 0.2
 
 
+@dataclass(frozen=True)
+class GivenCycles(Schedule):
+    """A run with one jump to each of these numbers of cycles, in ascending order."""
+
+    ends: tuple[float, ...]
+
+    def ended(self, state: CoupledState[Any]) -> bool:
+        return state.jump == len(self.ends)
+
+    def next_jump(self, state: CoupledState[Any]) -> float:
+        return self.ends[state.jump] - float(state.cycles[-1])
+
+    def left(self, state: CoupledState[Any]) -> float:
+        return self.ends[-1] - float(state.cycles[-1])
+
+
+@dataclass(frozen=True)
+class JumpProgress(Observer):
+    """Progress of the wear to the next state."""
+
+    reporter: Reporter
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        with self.reporter.part(0.0, WEAR, name), self.reporter.stage(name):
+            yield
+
+    def worn(self, cycles: float, done: float) -> None:
+        """Report that ``done`` of the ``cycles`` of a jump have worn."""
+        self.reporter.reached(done / cycles, f"{done:.3g} of {cycles:.3g} cycles")
+
+
 def worn_states(
     numbers: tuple[float, ...],
     stepper: Stepper[State, Contact],
     state: State,
     contact_at: Callable[[State], Contact],
+    areas: Array | float,
     describe: Callable[[State, float, int], WornRig],
     reporter: Reporter,
     steps: Steps,
@@ -34,36 +73,22 @@ def worn_states(
     """Return the unworn state, and the states after each number of cycles.
 
     ``describe`` returns the description of a state, from the state, its cycles, and the number of
-    steps since the last one.
+    steps since the last one. ``areas`` are those of the cells or nodes [mm²].
     """
-    total, done = numbers[-1], 0.0
-    states = []
+    progress = JumpProgress(reporter)
+    contact = SoleContact(stepper, contact_at, areas, steps, progress.worn)
+    loop = CoupledWear(GivenCycles(numbers), None, contact, [progress])
+    begun = loop.unworn([state])
+    states, before = [], 0
     with reporter.course("vibration and wear"):
-        for cycles in reporter.parts((0.0, *numbers), lambda cycles: f"{cycles:.4g} cycles"):
-            count = 0
-            if cycles > 0.0:
-                stretch, left = cycles - done, total - done
-                with reporter.part(0.0, WEAR, "wear"), reporter.stage("wear"):
-                    worn = advance_cycles(
-                        stepper,
-                        state,
-                        stretch,
-                        left,
-                        contact_at,
-                        steps,
-                        partial(_tell, reporter, stretch),
-                    )
-                state, done = worn.state, cycles
-                count = worn.spent.steps
+        parts = reporter.parts((0.0, *numbers), lambda cycles: f"{cycles:.4g} cycles")
+        for cycles, worn in zip(parts, chain([begun], loop.march(begun)), strict=True):
+            count, before = worn.spent.steps - before, worn.spent.steps
             name = "worn state" if count else "unworn state"
             with reporter.part(WEAR if count else 0.0, 1.0):
-                states.append(steps(name, partial(describe, state, cycles, count)))
+                (contact_state,) = worn.interfaces
+                states.append(steps(name, partial(describe, contact_state, cycles, count)))
     return tuple(states)
-
-
-def _tell(reporter: Reporter, stretch: float, cycles: float) -> None:
-    """Report that a number of ``cycles`` of a ``stretch`` have worn."""
-    reporter.reached(cycles / stretch, f"{cycles:.3g} of {stretch:.3g} cycles")
 
 
 def responses_to_all(

@@ -5,16 +5,18 @@ The coupled loop (:mod:`wear.coupled`) calls them but does not depend on them.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 
 from sa_solver.types import Array
 from wear.coupled import CoupledSettings, CoupledState, Observer
-from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.checks.warnings import warn_of_growth, warn_of_instability
+from workflow.analyses.wear.checks.warnings import (
+    warn_of_growth,
+    warn_of_instability,
+    warn_of_many_jumps,
+)
 from workflow.analyses.wear.worn.bolts import kept_tensions
 from workflow.analyses.wear.worn.contact_loops import kept_loops
 from workflow.case.text.plain import counted
@@ -22,9 +24,11 @@ from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 from workflow.models.progress import ReportsProgress
 from workflow.shell.analysis import Run
-from workflow.shell.folders import steps
-from workflow.shell.folders.store import write_arrays
+from workflow.shell.folders.steps import RunSteps
 from workflow.shell.terminal.reporter import Reporter
+
+# Number of jumps above which the run warns.
+MANY_JUMPS = 300
 
 
 @contextmanager
@@ -70,49 +74,34 @@ class RunLog(Observer):
             f"{spent.convolutions} convolutions, drift {drift:.2%}"
         )
 
+    def remaining(self, state: CoupledState, jumps: int) -> None:
+        reporter, done, total = self.run.reporter, state.jump, state.jump + jumps
+        if done == MANY_JUMPS:
+            warn_of_many_jumps(self.run.case.wear, state, jumps, reporter)
+        at = f"jump {done} of about {total}, {state.cycles[-1]:.4g} cycles"
+        reporter.reached(done / total, at)
 
-@dataclass
+
+@dataclass(frozen=True)
 class FileRecorder(Observer):
-    """Writer of the fields of every jump and, from time to time, of the state for a restart.
-
-    Fields are those at ``peak`` load. ``jumps`` are the digests of the jump files, starting with
-    those of a resumed run. :mod:`workflow.shell.folders.steps` limits the share of time for writing
-    states; the last state is written whatever ends the march, within :meth:`kept`.
-    """
+    """Writer of the fields at ``peak`` load after every jump, as files of the run's ``steps``."""
 
     run: Run[WearCase]
     settings: CoupledSettings
     peak: int
     contacts: FaceContacts
-    jumps: list[str]
     source: LoadSource
-
-    def __post_init__(self) -> None:
-        self._unsaved: CoupledState | None = None
-        # Time when the last state was written, and how long that took [s].
-        self._saved, self._cost = time.perf_counter(), steps.FIRST_SAVE
-
-    @contextmanager
-    def kept(self) -> Iterator[None]:
-        """March within this context; its last state is written unless a disk error ends it."""
-        try:
-            yield
-        except OSError:
-            raise
-        except BaseException:
-            self._save()
-            raise
-        self._save()
+    steps: RunSteps
 
     def begin(self, state: CoupledState) -> None:
-        if not self.jumps:
-            self.keep(state)
+        if not self.steps.recorded:
+            self.record(state)
 
     def jumped(self, before: CoupledState, after: CoupledState) -> None:
-        self.keep(after)
+        self.record(after)
 
-    def keep(self, state: CoupledState) -> None:
-        """Write the fields of this jump, then the state if it is due."""
+    def record(self, state: CoupledState) -> None:
+        """Write the fields of this jump."""
         loops = self._loops(state)
         with self.run.reporter.stage("checkpoints"):
             recorded = self.contacts.fields(state.interfaces, self.peak)
@@ -123,23 +112,8 @@ class FileRecorder(Observer):
                 for body, height in enumerate(stage.on_grid(interface).heights, start=1):
                     arrays[f"surfaces/{name}/body_{body}"] = height
                 arrays |= {f"contact/{name}/{k}": field for k, field in vars(fields).items()}
-            attributes = {"cycles": float(state.cycles[-1])}
-            path = self.run.folder.jump(state.jump)
             arrays |= loops | kept_tensions(self.source, state)
-            self.jumps.append(write_arrays(path, arrays, attributes))
-        self._unsaved = state
-        if time.perf_counter() - self._saved >= self._cost / steps.SHARE:
-            self._save()
-
-    def _save(self) -> None:
-        """Write the state of the last recorded jump, unless it is written already."""
-        if self._unsaved is None:
-            return
-        begun = time.perf_counter()
-        with self.run.reporter.stage("checkpoints"):
-            checkpoint.keep(self.run, self._unsaved, self.jumps)
-        self._unsaved, self._saved = None, time.perf_counter()
-        self._cost = self._saved - begun
+            self.steps.record(state.jump, arrays, {"cycles": float(state.cycles[-1])})
 
     def _loops(self, state: CoupledState) -> dict[str, Array]:
         """Return the tangential loops on the present surfaces, if they are due."""

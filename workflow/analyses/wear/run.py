@@ -14,13 +14,11 @@ from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, MotionError
 from wear.coupled import CoupledState
 from wear.steps.stepping import ContactFailure
-from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.budget.finding import Begun, lives_of_companions
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.checks.warnings import (
     warn_of_contact,
     warn_of_file,
-    warn_of_many_jumps,
     warn_of_structure,
     warn_of_worn_cells,
 )
@@ -46,11 +44,9 @@ from workflow.models.structure import StructureLoads
 from workflow.models.wear import WearModel
 from workflow.shell.analysis import Run
 from workflow.shell.folders.cache import DiskStore
+from workflow.shell.folders.steps import RunSteps, kept_steps
 from workflow.shell.processes import Workers
 from workflow.shell.terminal.reporter import Reporter
-
-# Number of jumps above which the run warns.
-MANY_JUMPS = 300
 
 
 def run_wear(run: Run[WearCase]) -> None:
@@ -59,7 +55,8 @@ def run_wear(run: Run[WearCase]) -> None:
     report_choice(run.choice, run.reporter, again=run.resume)
     try:
         with ExitStack() as working:
-            outcome, lives = _compute(run, working)
+            with kept_steps(run) as steps:
+                outcome, lives = _compute(run, working, steps)
             with one_thread():
                 write_output(outcome, lives, run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
@@ -75,15 +72,13 @@ def run_wear(run: Run[WearCase]) -> None:
         raise UserError(f"{folder.case}: structure: {error}") from error
 
 
-def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
+def _compute(run: Run[WearCase], working: ExitStack, steps: RunSteps) -> tuple[Outcome, Begun]:
     """Return the outcome of the run before its files are written, and its probe runs.
 
     The contacts may solve their last cycles while the stress of the structure is computed;
     ``working`` keeps the workers until these results are in.
     """
     case, reporter = run.case, run.reporter
-    # This comes first, so that an unusable state is reported before anything is computed.
-    kept = checkpoint.restored(run, run.kept) if run.kept else None
     for doubt in case.surface_doubts():
         reporter.warn(doubt)
     model = wear_model(case)
@@ -107,7 +102,7 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
             warn_of_file(source, reporter)
         with reporter.stage("contact set-up"):
             contacts = _contacts(case, model, source, workers)
-        state, first = _march(run, model, source, contacts, unworn, kept)
+        state, first = _march(run, model, source, contacts, unworn, steps)
         ends = _told_once(contacts.ends(state.interfaces), working, len(faces))
     columns = contacts.stages, unworn, first, state.interfaces, ends
     finer = partial(structure_of(case).finer_cycles, case)
@@ -161,24 +156,17 @@ def _march(
     source: LoadSource,
     contacts: FaceContacts,
     unworn: Sequence[FaceLoads],
-    kept: CoupledState | None,
+    steps: RunSteps,
 ) -> tuple[CoupledState, list[FirstContact]]:
-    """Return the final state, from ``kept`` or from unworn surfaces, and the first contacts."""
+    """Return the final state, and the first contacts."""
     case, reporter, settings = run.case, run.reporter, model.settings(source)
-    jumps = list(run.kept.jumps) if run.kept else []
-    recorder = FileRecorder(run, settings, source.peak, contacts, jumps, source)
+    recorder = FileRecorder(run, settings, source.peak, contacts, source, steps)
     loop = model.loop(source, contacts, (RunLog(run, contacts, source), recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source, contacts.stages, state, first, reporter)
-    end = contacts.restored(kept) if kept else state
-    begun = end.jump
-    with reporter.course("wear"), recorder.kept():
-        for end in loop.march(end):  # noqa: B020 - each from the one before
-            left = loop.jumps_left(end)
-            if end.jump == MANY_JUMPS:
-                warn_of_many_jumps(case.wear, end, left, reporter)
-            at = f"jump {end.jump} of about {end.jump + left}, {end.cycles[-1]:.4g} cycles"
-            reporter.reached((end.jump - begun) / (end.jump - begun + left), at)
+    with reporter.course("wear"):
+        end = loop.run(state, steps)
+    steps.save()
     warn_of_worn_cells(case, source.peak, contacts.stages, end, reporter)
     return end, first
 

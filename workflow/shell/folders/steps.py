@@ -1,7 +1,8 @@
 """Storage of the steps of a run on disk, from which an interrupted run resumes.
 
-Finished steps are appended to files of ``jumps``, each with some seconds of work. The checkpoint
-ties these files together and holds the states that marches have reached. A resumed run executes its
+Finished steps are appended to files of ``jumps``, each with some seconds of work. A run may record
+files of its own there, such as the fields after a jump. The checkpoint ties these files together
+and holds the states that marches have reached. A resumed run executes its
 code from the start, but reads the results of finished steps instead of computing them. Warm starts,
 caches and counters therefore develop as before, and the first computed step starts from the same
 state as in the interrupted run. The result of a new step is returned as it would be read from disk,
@@ -64,8 +65,11 @@ class RunSteps:
     def __init__(self, run: Run[Any]) -> None:
         self._folder, self._reporter, self._provenance = run.folder, run.reporter, run.provenance
         self._files = [] if run.kept is None else list(run.kept.jumps)
-        self._before = 0 if run.kept is None else int(run.kept.attributes[STEPS])
-        self._marches = {} if run.kept is None else _unjoined(run.kept.arrays)
+        try:
+            self._before = 0 if run.kept is None else int(run.kept.attributes[STEPS])
+            self._marches = {} if run.kept is None else _unjoined(run.kept.arrays)
+        except KeyError as error:
+            raise self._of_another_version(error) from error
         self._kept = self._of_files()
         # Results that are not saved yet, in the order of their steps.
         self._new: dict[Place, bytes] = {}
@@ -103,6 +107,16 @@ class RunSteps:
                 return self._keep(self._new, place, name, state, warned)
             number += 1
             state = self._keep(marches, (*place, number), name, following, warned)
+
+    @property
+    def recorded(self) -> bool:
+        """True if the run has any files: of its own, or with steps."""
+        return bool(self._files)
+
+    def record(self, number: int, arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> None:
+        """Write the file of this ``number``, in place of later ones that an interruption left."""
+        digest = write_arrays(self._folder.jump(number), arrays, attributes)
+        self._files[number:] = [digest]
 
     def report(self) -> None:
         """Log how many steps this process has computed."""
@@ -190,7 +204,8 @@ class RunSteps:
         kept: dict[Place, bytes] = {}
         for number in range(len(self._files)):
             arrays, _ = read_arrays(self._folder.jump(number))
-            kept |= _unjoined(arrays)
+            if PLACES in arrays:
+                kept |= _unjoined(arrays)
         reached = {place[:-1]: place for place in self._marches}
 
         def counts(place: Place) -> bool:

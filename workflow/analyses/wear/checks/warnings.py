@@ -164,7 +164,7 @@ def warn_of_contact(
         if doubt := _energies_apart(source, stage, interface.loads, result):
             reporter.warn(f"{stage.name}: {doubt}")
         if result.touches_border:
-            warn_of_border(stage, reporter)
+            reporter.warn(stage.border_warning)
         settings, pressure = case.contact_of(stage.name), result.pressure[source.peak]
         check_cells(stage.name, settings, stage.grid, pressure, reporter)
         for line in structure_of(case).warnings(case, stage, float(interface.loads.P[source.peak])):
@@ -228,7 +228,7 @@ def warn_of_growth(stages: list[FaceContact], state: CoupledState, reporter: Rep
     for stage, interface in zip(stages, state.interfaces, strict=True):
         worn = interface.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
-            warn_of_border(stage, reporter)
+            reporter.warn(stage.border_warning)
 
 
 def warn_of_many_jumps(wear: Duration, state: CoupledState, left: int, reporter: Reporter) -> None:
@@ -251,11 +251,3 @@ def warn_of_worn_cells(
             pressure = interface.starts[peak].pressure
             settings = case.contact_of(stage.name)
             check_cells(stage.name, settings, stage.grid, pressure, reporter, worn=True)
-
-
-def warn_of_border(stage: FaceContact, reporter: Reporter) -> None:
-    """Warn of a contact that is cut off by the border of its grid."""
-    reporter.warn(
-        f"{stage.name}: the contact touches the border of its grid, where it is cut off: "
-        f"{stage.remedy}"
-    )
