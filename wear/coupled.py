@@ -3,8 +3,10 @@
 Contacts wear in jumps of many cycles. After each jump a cheap probe of the load source tells how
 far wear has changed the resultants since the source was last solved. If the change is too large,
 the source is solved again with the worn gaps. :meth:`CoupledWear.march` yields the state after
-every jump, and a run can be resumed from any of these states with the same results. Records,
-progress and the like are left to :class:`Observer` objects.
+every jump, and a run can be resumed from any of these states with the same results.
+:meth:`CoupledWear.run` stores and resumes them by itself. Records, progress and the like are left
+to :class:`Observer` objects. A contact whose motion follows from its own surfaces, such as that of
+a vibrating structure, wears in the same loop without a load source.
 """
 
 from __future__ import annotations
@@ -124,7 +126,11 @@ class Stop:
 
 
 class Schedule(ABC):
-    """Base class of the lengths of the jumps of a run, and of its end."""
+    """Base class of the lengths of the jumps of a run, and of its end.
+
+    ``resultants``, ``drift`` and ``friction`` are those of :class:`CoupledSettings`: without them,
+    loads are never solved again.
+    """
 
     resultants: Literal["constant", "drift", "every"] = "constant"
     drift: float = 0.0
@@ -345,11 +351,12 @@ class CoupledWear(Generic[Worn]):
     Parameters
     ----------
     settings
-        Length of the run, its jumps, and when the loads are solved again.
+        Length of the run, its jumps, and when the loads are solved again: those of
+        :class:`CoupledSettings`, or another :class:`Schedule`.
     source
-        Source of the loads; None where the contacts know their own.
+        Source of the loads of :class:`Contacts`; None for a contact with its own.
     contacts
-        The wearing contacts.
+        The wearing contacts: :class:`Contacts`, or a :class:`wear.contact.contacts.SoleContact`.
     observers
         Objects that follow the run.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -22,6 +23,26 @@ KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
 """Columns of the kinetics of one interface, in mm, mm³ and N mm."""
 
 Same = TypeVar("Same")
+Solution = TypeVar("Solution")
+
+
+class LastSolved(Generic[State, Solution]):
+    """Solutions of the last states, each solved once: those before and after a step.
+
+    States with the same surfaces and the same energy have the same solution.
+    """
+
+    def __init__(self, solve: Callable[[State], Solution]) -> None:
+        self._solve = solve
+        self._known: deque[tuple[State, Solution]] = deque(maxlen=2)
+
+    def __call__(self, state: State) -> Solution:
+        for known, solution in self._known:
+            if known.surfaces is state.surfaces and known.energy == state.energy:
+                return solution
+        solution = self._solve(state)
+        self._known.append((state, solution))
+        return solution
 
 
 class WearingContacts(Protocol[State]):

@@ -166,8 +166,7 @@ class Analysis(Generic[AnyCase]):
         Output that a second process helps to draw; figures are excluded if drawing them takes less
         than the half second in which that process would load the plotting library.
     resumable
-        Whether a run writes a checkpoint (:mod:`workflow.shell.folders.checkpoint`), of its steps
-        (:mod:`workflow.shell.folders.steps`) or of a state that the analysis defines.
+        Whether a run stores its steps in a checkpoint (:mod:`workflow.shell.folders.steps`).
     choose
         Returns the case with the settings that it leaves open, and a record of the reasons.
     comparison

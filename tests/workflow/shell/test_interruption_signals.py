@@ -196,7 +196,7 @@ from workflow.shell.folders import checkpoint, store
 whole, written = store.write_arrays, []
 def torn(path, arrays, attributes):
     written.append(path)
-    if len(written) < 4:
+    if len(written) < 3:
         return whole(path, arrays, attributes)
     with store.replacing(path) as partial:
         whole(partial, arrays, attributes)

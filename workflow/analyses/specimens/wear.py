@@ -11,7 +11,7 @@ import numpy as np
 from fe_models.joints.reduced_contact import FrettingConditions, FrettingCycle, ReducedPair
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
-from wear.contact.contacts import SoleContact
+from wear.contact.contacts import LastSolved, SoleContact
 from wear.contact.nodes import NodalContact, NodalState
 from wear.coupled import CoupledState, CoupledWear, Observer, Schedule
 from wear.laws import WearLaw
@@ -77,18 +77,16 @@ class FrettedPair:
     ) -> None:
         self.pair, self._laws, self._conditions = pair, laws, conditions
         self._steps = steps
-        self._last: tuple[NodalState, PairCycle] | None = None
+        self.cycle_at = LastSolved(self._solve)
         self._described: tuple[CoupledState[NodalState], BlockState] | None = None
 
-    def cycle_at(self, state: NodalState) -> PairCycle:
+    def _solve(self, state: NodalState) -> PairCycle:
         """Return the cycle on the surfaces of ``state``, started from its last contact."""
-        if self._last is None or self._last[0].surfaces is not state.surfaces:
-            conditions = self._conditions
-            guess = None if state.start is None else np.asarray(state.start)
-            gap, cycle = state.surfaces.gap, self.pair.fretting_cycle
-            contact = self._steps("fretting cycle", lambda: cycle(gap, conditions, guess))
-            self._last = state, PairCycle(self.pair, contact, conditions.friction)
-        return self._last[1]
+        conditions = self._conditions
+        guess = None if state.start is None else np.asarray(state.start)
+        gap, cycle = state.surfaces.gap, self.pair.fretting_cycle
+        contact = self._steps("fretting cycle", lambda: cycle(gap, conditions, guess))
+        return PairCycle(self.pair, contact, conditions.friction)
 
     def contact_at(self, state: NodalState) -> NodalContact:
         """Return the contact in a state in the form that wear steps need."""

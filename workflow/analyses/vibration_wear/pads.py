@@ -8,9 +8,8 @@ at rest and the motion are then computed again.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,20 +18,18 @@ from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
+from wear.contact.contacts import LastSolved
 from wear.contact.nodes import NodalContact, NodalState
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.periodic.march import PeriodicMarch
 from wear.laws import WearLaw
 from wear.steps.stepping import ContactFailure
-from wear.surfaces import Surfaces
 from workflow.models.vibration.amount import FORCE, ExcitationSize
 from workflow.models.vibration.structure import VibratingStructure
 
 # Relative change of a resonance's frequency from one state to the next. Farther away, Newton's
 # method may find another mode.
 CLOSE = 0.05
-# Number of stored cycles: those before and after a step.
-KEPT = 2
 
 
 @dataclass(frozen=True)
@@ -128,32 +125,27 @@ class WearingPads:
     frequency: float | None
     amount: ExcitationSize = FORCE
     search: Callable[[HarmonicBalance], HarmonicSolution] | None = None
-    _solved: deque[tuple[Surfaces, PadCycle]] = field(
-        init=False, default_factory=lambda: deque(maxlen=KEPT)
-    )
 
     def begin(self) -> NodalState:
         """Return the state before the first cycle."""
         return NodalState.unworn(self.unworn.rig.gap)
 
-    def at(self, state: NodalState) -> PadCycle:
-        """Return the cycle of the pads in a state.
+    @cached_property
+    def at(self) -> LastSolved[NodalState, PadCycle]:
+        """The cycle of the pads in a state.
 
         The motion is solved from that of the state before. Raises
         :class:`wear.steps.stepping.ContactFailure` where no motion is found.
         """
-        for surfaces, cycle in self._solved:
-            if surfaces is state.surfaces:
-                return cycle
+        return LastSolved(self._solve)
+
+    def _solve(self, state: NodalState) -> PadCycle:
         model = worn_model(self.unworn, state.surfaces.depth)
         start = state.start
         assert start is None or isinstance(start, HarmonicSolution)
         if start is not None:
             start = _moved_by(start, model.problem.rest.displacement)
-        motion = self._motion(model.problem, start)
-        cycle = PadCycle(model, motion)
-        self._solved.append((state.surfaces, cycle))
-        return cycle
+        return PadCycle(model, self._motion(model.problem, start))
 
     def contact_at(self, state: NodalState) -> NodalContact:
         """Return the contact in a state in the form that wear steps need."""

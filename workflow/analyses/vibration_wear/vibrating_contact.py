@@ -10,7 +10,6 @@ the pressure that changes by wear, wears the surfaces.
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +24,7 @@ from sa_solver.cycles.tangential_loop import LoopFailure, LoopPath, TangentialLo
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from wear.contact.contacts import LastSolved
 from wear.contact.drive import Drive
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic.parallel import ParallelSliders
@@ -38,8 +38,6 @@ from workflow.analyses.wear.structures.bodies.source import gap_of
 from workflow.models.rig.rig_model import RigModel
 from workflow.models.vibration.excitation import Driving
 
-# Number of stored contacts: those before and after a step.
-KEPT = 2
 # Share by which friction may change in a wear step.
 FRICTION_CHANGE = 0.03
 # Steps of each branch of the half-space loop.
@@ -112,7 +110,7 @@ class VibratingContact:
         assert isinstance(case.load_path, Reciprocation), "a case that is unfit"
         self._tilt, self.load = case.load_path.tilt, case.load_path.P
         self._receptance = Receptance(rig.model)
-        self._solved: deque[ContactCycle] = deque(maxlen=KEPT)
+        self.at = LastSolved(self._solve)
 
     @property
     def settings(self) -> WearGrid:
@@ -128,19 +126,6 @@ class VibratingContact:
         result = cycle.wearing.cycle(replace(unworn, starts=starts), cycle.wearing.dissipating)
         depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
         return replace(unworn, starts=starts, depth_rate=depth_rate, volume_rate=volume_rate)
-
-    def at(self, state: WearState) -> ContactCycle:
-        """Return the contact in a state.
-
-        The motion is solved from that of the state before. Raises ContactFailure where contact or
-        motion are not found.
-        """
-        for solved in self._solved:
-            same = solved.state.surfaces is state.surfaces
-            if same and solved.state.energy == state.energy:
-                return solved
-        self._solved.append(self._solve(state))
-        return self._solved[-1]
 
     def wearing(self, state: WearState) -> WearingContact:
         """Return the contact in a state in the form that wear steps need."""
@@ -186,6 +171,11 @@ class VibratingContact:
 
     # -- steps of at --------------------------------------------------------------------------
     def _solve(self, state: WearState) -> ContactCycle:
+        """Return the contact in a state.
+
+        The motion is solved from that of the state before. Raises ContactFailure where contact or
+        motion are not found.
+        """
         tolerance = self._case.contact.tolerance
         start = state.starts.get(0)
         try:

@@ -94,7 +94,7 @@ class FileRecorder(Observer):
     steps: RunSteps
 
     def begin(self, state: CoupledState) -> None:
-        if not self.steps.recorded:
+        if self.run.kept is None:
             self.record(state)
 
     def jumped(self, before: CoupledState, after: CoupledState) -> None:

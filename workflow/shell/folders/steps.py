@@ -108,11 +108,6 @@ class RunSteps:
             number += 1
             state = self._keep(marches, (*place, number), name, following, warned)
 
-    @property
-    def recorded(self) -> bool:
-        """True if the run has any files: of its own, or with steps."""
-        return bool(self._files)
-
     def record(self, number: int, arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> None:
         """Write the file of this ``number``, in place of later ones that an interruption left."""
         digest = write_arrays(self._folder.jump(number), arrays, attributes)
