@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, nan
 
-from workflow.chart.axes import Axis, Rung
+from workflow.analyses.wear.approximations.approximation import Approximation, Rung
+from workflow.analyses.wear.approximations.convergence import Convergence, richardson
 from workflow.chart.costs import Cost
 from workflow.chart.frontier import Option, efficient
-from workflow.shell.convergence import Convergence, richardson
 
 # Relative changes of a quantity below this are rounding, and say nothing about convergence.
 ROUNDING = 1e-12
@@ -74,9 +74,9 @@ class Judged:
 
 @dataclass(frozen=True)
 class Ladder:
-    """Axis with all of its runs; ``failed`` has an error message for each run that failed."""
+    """Approximation with all of its runs; ``failed`` has a message for each that failed."""
 
-    axis: Axis
+    axis: Approximation
     rungs: tuple[Judged, ...]
     references: Mapping[str, Reference]
     failed: Mapping[str, str]
@@ -139,7 +139,7 @@ def _finer(one: Point, other: Point) -> bool:
 
 
 def judge(
-    axis: Axis,
+    axis: Approximation,
     points: Sequence[Point],
     exact: Mapping[str, float],
     failed: Mapping[str, str],
@@ -177,7 +177,7 @@ def judge(
 
 
 def _reference(
-    axis: Axis, points: Sequence[Point], quantity: str, exact: Mapping[str, float]
+    axis: Approximation, points: Sequence[Point], quantity: str, exact: Mapping[str, float]
 ) -> Reference:
     last = points[-1]
     value = last.values[quantity]
@@ -189,7 +189,7 @@ def _reference(
     )
 
 
-def _convergence(axis: Axis, points: Sequence[Point], quantity: str) -> Convergence:
+def _convergence(axis: Approximation, points: Sequence[Point], quantity: str) -> Convergence:
     """Return the convergence on the branch of the last point; one without steps is a choice."""
     last = points[-1]
     branch = [p for p in points if p.rung.branch == last.rung.branch and p.rung.step is not None]

@@ -7,7 +7,6 @@ reused and interrupted ones resumed.
 
 from __future__ import annotations
 
-import json
 import re
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -19,10 +18,15 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from workflow.analyses.wear.approximations.approximation import (
+    Approximation,
+    entry_at,
+    overrides_of,
+)
 from workflow.case.changing import changed
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case
-from workflow.chart.axes import Axis, Setting, axes_of, entry_at
+from workflow.chart.axes import Setting, axes_of
 from workflow.chart.costs import Cost, costs
 from workflow.chart.ladder import Ladder, Point, judge
 from workflow.errors import MethodFailed, UserError
@@ -132,8 +136,8 @@ def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
         case = changed(case, {"fidelity": "fixed"})
     # Open settings are chosen once, for the case as written, and fixed on all rungs.
     _, record = analysis_of(case).choose(case)
-    for entry, value in (record or {"chosen": {}})["chosen"].items():
-        yield f"{entry}={json.dumps(value)}"
+    if record is not None:
+        yield from overrides_of(record["chosen"])
 
 
 def _claim(folder: OutputFolder, case: Case) -> None:
@@ -147,7 +151,7 @@ def _claim(folder: OutputFolder, case: Case) -> None:
 
 
 def _jobs(
-    case: Path, base: Sequence[str], settings: Mapping[Axis, list[Setting]]
+    case: Path, base: Sequence[str], settings: Mapping[Approximation, list[Setting]]
 ) -> dict[str, Job]:
     """Return a job for each different case, by its text; the case's own settings come first."""
     baseline = Setting.of(case, base)
@@ -163,7 +167,7 @@ def _jobs(
 
 def _run(
     jobs: Mapping[str, Job],
-    settings: Mapping[Axis, list[Setting]],
+    settings: Mapping[Approximation, list[Setting]],
     out: Path,
     quantities: Sequence[str],
     reporter: Reporter,
@@ -264,7 +268,7 @@ def _check(quantities: Sequence[str], summary: Mapping[str, Any]) -> None:
 
 
 def _ladder(
-    axis: Axis,
+    axis: Approximation,
     settings: Sequence[Setting],
     jobs: Mapping[str, Job],
     runs: Mapping[str, _Run],
@@ -294,7 +298,7 @@ def _ladder(
     return judge(axis, points, exact, failed, finest=rungs[-1][0].name)
 
 
-def _quantities(axis: Axis, run: _Run, picked: Sequence[str]) -> list[str]:
+def _quantities(axis: Approximation, run: _Run, picked: Sequence[str]) -> list[str]:
     """Return the quantities by which the rungs of an axis are compared."""
     comparison = analysis_of(run.case).comparison
     if axis.sections:

@@ -19,8 +19,9 @@ from click.testing import CliRunner, Result
 import workflow.chart.run
 from sa_solver.reference.hertz import HertzSphere
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
+from workflow.analyses.wear.approximations import ladders
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.chart import axes, chart_case
+from workflow.chart import chart_case
 from workflow.chart.ladder import Ladder
 from workflow.cli import cli
 from workflow.errors import UserError
@@ -320,9 +321,9 @@ def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     longer = ROLLER_WEAR.replace("  cycles: 4e4", "  cycles: 1e5")
     (tmp_path / "line.yaml").write_text(longer, encoding="utf-8")
     (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
-    monkeypatch.setattr(axes, "JUMPS", (5, 10, 20))
-    monkeypatch.setattr(axes, "ERRORS", ())
-    monkeypatch.setattr(axes, "EXPLICIT", ())
+    monkeypatch.setattr(ladders, "JUMPS", (5, 10, 20))
+    monkeypatch.setattr(ladders, "ERRORS", ())
+    monkeypatch.setattr(ladders, "EXPLICIT", ())
     run = in_process(lambda job, folder: run_case(job.load(), folder, force=True))
     monkeypatch.setattr(workflow.chart.run, "run_jobs", run)
     charted = chart_case(tmp_path / "line.yaml", tmp_path / "out", axes=("stepper",))

@@ -298,7 +298,7 @@ def test_sentence_of_a_uniform_slot():
 @pytest.fixture
 def dimension_only(monkeypatch):
     """Let the other axes leave the case unchanged."""
-    monkeypatch.setattr(choosing, "AXES", ())
+    monkeypatch.setattr(choosing, "SHARES", {})
 
 
 def auto(path: Path, *overrides: str):

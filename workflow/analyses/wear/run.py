@@ -15,7 +15,7 @@ from wear.contact.interface import FirstContact, MotionError
 from wear.coupled import CoupledState
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear import checkpoint
-from workflow.analyses.wear.budget.finding import Begun, lives_of_companions
+from workflow.analyses.wear.budget.finding import ProbeResults, begin_probe_runs
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.checks.warnings import (
     warn_of_contact,
@@ -59,9 +59,9 @@ def run_wear(run: Run[WearCase]) -> None:
     report_choice(run.choice, run.reporter, again=run.resume)
     try:
         with ExitStack() as working:
-            outcome, lives = _compute(run, working)
+            outcome, probe_results = _compute(run, working)
             with one_thread():
-                write_output(outcome, lives, run)
+                write_output(outcome, probe_results, run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
         remedy = f"; the state is kept, see `{folder.resume_command}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
@@ -75,7 +75,7 @@ def run_wear(run: Run[WearCase]) -> None:
         raise UserError(f"{folder.case}: structure: {error}") from error
 
 
-def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
+def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, ProbeResults]:
     """Return the outcome of the run before its files are written, and its probe runs.
 
     The contacts may solve their last cycles while the stress of the structure is computed;
@@ -96,7 +96,7 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
     )
     with reported_stage(reporter, source, "condensation", "steps"):
         source.prepare()
-    lives = lives_of_companions(case, source, reporter, run.beside)
+    probe_results = begin_probe_runs(case, source, reporter, run.beside)
     with one_thread():
         with reported_stage(reporter, source, "structural friction", "increments"):
             unworn = source.unworn()
@@ -115,7 +115,7 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
         InterfaceOutcome(*column, state.cycles, state.kinetics[:, number], finer)
         for number, column in enumerate(zip(*columns, strict=True))
     ]
-    return Outcome(case, source, state, interfaces), lives
+    return Outcome(case, source, state, interfaces), probe_results
 
 
 def _told_once(

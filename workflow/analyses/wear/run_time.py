@@ -49,7 +49,7 @@ STRESS, SEARCHED, CARRIED = 1.2e-6, 10.0, 1e-6
 # Probe runs in a worker process for the errors of mesh, grid and coupling: their number, steps and
 # largest number of cells per axis; time of mesh and factors of their structures, and of a friction
 # iteration in the plane [s].
-LIVES, LIFE_STEPS, LIFE_CELLS = 4, 6, 64
+PROBE_RUNS, PROBE_STEPS, PROBE_CELLS = 4, 6, 64
 PLANE, PLANE_ITERATION = 0.5, 1e-4
 # Time of stress and mesh of the structure at the end, in sparse factors; of figures and files [s].
 WORN, PICTURES = 2.0, 6.0
@@ -114,7 +114,7 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
     cycle = _structural_cycle(extent)
     before = shared * begun + _condensation(extent) + CYCLES * cycle
     after = PICTURES + WORN * factors(extent.nodes) + cycle + _stress(case, extent, cells)
-    after += _lives(case, extent, plane)
+    after += _probe_runs(case, extent, plane)
     assumed = counted(ceil(jumps), "wear jump") if taken.unknown else ""
     return RunTime(before, shared * worn + again * cycle, after, assumed, taken.unknown)
 
@@ -181,20 +181,20 @@ def _stress(case: WearCase, extent: Extent, cells: int) -> float:
     return 2.0 * (searched + carried) * extent.faces * extent.increments * cells
 
 
-def _lives(case: WearCase, extent: Extent, plane: bool) -> float:
+def _probe_runs(case: WearCase, extent: Extent, plane: bool) -> float:
     """Return the time of probe runs for the error budget, one of them on a finer mesh [s]."""
     if case.error_budget == "known" or case.contact.method == "nodes":
         return 0.0
-    plane, life = plane or extent.section is not None, extent.section or extent
-    across, along = (min(count, LIFE_CELLS) for count in case.contact.grid)
+    plane, probed = plane or extent.section is not None, extent.section or extent
+    across, along = (min(count, PROBE_CELLS) for count in case.contact.grid)
     cells, kind = (across, NORMAL_LINE) if plane else (across * along // 4, NORMAL)
-    lives = LIVES if life.interface_nodes else LIVES // 2
-    solved = lives * life.faces * life.increments * (1.0 + LIFE_STEPS * life.dissipating)
+    runs = PROBE_RUNS if probed.interface_nodes else PROBE_RUNS // 2
+    solved = runs * probed.faces * probed.increments * (1.0 + PROBE_STEPS * probed.dissipating)
     contacts = solves(solved, cells, kind)
-    if not life.interface_nodes or case.recoupling.resultants == "constant":
+    if not probed.interface_nodes or case.recoupling.resultants == "constant":
         return contacts
-    finer = replace(life, interface_nodes=2.0 * life.interface_nodes)
-    own, other = (LIFE_STEPS / 2 * _structural_cycle(mesh) for mesh in (life, finer))
+    finer = replace(probed, interface_nodes=2.0 * probed.interface_nodes)
+    own, other = (PROBE_STEPS / 2 * _structural_cycle(mesh) for mesh in (probed, finer))
     # In the other probe runs the loads stay constant.
-    iterated = LIFE_STEPS * life.increments * ITERATIONS * PLANE_ITERATION
+    iterated = PROBE_STEPS * probed.increments * ITERATIONS * PLANE_ITERATION
     return contacts + own + other + 2.0 * PLANE + iterated

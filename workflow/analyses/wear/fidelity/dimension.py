@@ -6,9 +6,9 @@ from math import ceil
 
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.meshes.transfer import FaceTransfer
+from workflow.analyses.wear.approximations.probe_runs import Numbers, scales
 from workflow.analyses.wear.checks.uniformity import sections
 from workflow.analyses.wear.choice import Decision
-from workflow.analyses.wear.fidelity.estimate import Numbers, scales
 from workflow.analyses.wear.fidelity.probe import NOTCH
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
@@ -34,11 +34,11 @@ def choose_dimension(case: DovetailCase) -> Decision:
     proportional to that energy.
     """
     if case.structure.skew != 0.0:
-        return Decision(ENTRY, 3, "a skewed slot is not the same all along")
+        return Decision({ENTRY: 3}, "a skewed slot is not the same all along")
     try:
         values = {dimension: _mid_slot(case, dimension) for dimension in (2, 3)}
     except (MeshError, MethodFailed) as error:
-        return Decision(ENTRY, 3, f"the coarse probe failed: {error}")
+        return Decision({ENTRY: 3}, f"the coarse probe failed: {error}")
     differences = _differences(values[2], values[3], case.friction.coefficient)
     named = {
         (flank, name): v for flank, of_flank in differences.items() for name, v in of_flank.items()
@@ -53,7 +53,7 @@ def choose_dimension(case: DovetailCase) -> Decision:
     )
     allowed = MOST_USED * case.accuracy
     dimension, used = (3, 0.0) if largest > allowed else (2, largest)
-    return Decision(ENTRY, dimension, text, probe, allowed=allowed, error=used)
+    return Decision({ENTRY: dimension}, text, allowed, used, probe)
 
 
 def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
