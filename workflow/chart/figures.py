@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from math import inf, isfinite, log10
 from pathlib import Path
@@ -10,9 +10,9 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
+from matplotlib.transforms import Bbox
 
 from workflow.chart.ladder import ROUNDING, Judged, Ladder
-from workflow.chart.names import Place, name_marks
 from workflow.chart.run import Chart
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, write_figures
@@ -35,6 +35,20 @@ DEEPEST = 1e-3
 SMALLEST = 1e-12
 # Room for the name of the most expensive rung, relative to the width of the plot.
 LAST_NAME = 0.25
+NAME_SIZE = 9
+# Offsets [points] and alignment of a name from its mark; the first free one is used.
+BESIDE: tuple[tuple[int, int, str], ...] = (
+    (10, 6, "left"),
+    (10, -14, "left"),
+    (-10, 6, "right"),
+    (-10, -14, "right"),
+    (12, -4, "left"),
+    (-12, -4, "right"),
+)
+# Half the width of a mark [pixels].
+HALF_MARK = 5.0
+
+Place = tuple[float, float]
 
 
 def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
@@ -73,7 +87,7 @@ def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
     figure.draw_without_rendering()
     for axis, cost in panels:
         marks = [_place(rung, cost, bottom) for rung in ladder.rungs]
-        name_marks(axis, _names(ladder.rungs, cost, bottom), marks)
+        _name_marks(axis, _names(ladder.rungs, cost, bottom), marks)
     return figure
 
 
@@ -226,3 +240,41 @@ def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -
 def _label(figure: Figure) -> None:
     figure.axes[0].set_ylabel("largest relative error of the quantities")
     legend_below(figure, figure.axes[:1], columns=LEGEND_COLUMNS, fontsize=LEGEND_SIZE)
+
+
+# --- names --------------------------------------------------------------------------------------
+
+
+def _name_marks(axis: Axes, names: Iterable[tuple[str, Place]], marks: Sequence[Place]) -> None:
+    """Write each name next to its place, clear of all ``marks`` and of earlier names.
+
+    Names without room are left out, so the most important ones must come first. The layout of the
+    figure must be computed before.
+    """
+    taken = [_box(axis, place) for place in marks]
+    for name, place in names:
+        for across, up, side in BESIDE:
+            text = axis.annotate(
+                name,
+                place,
+                (across, up),
+                textcoords="offset points",
+                fontsize=NAME_SIZE,
+                ha=side,
+            )
+            text.set_in_layout(False)
+            box = text.get_window_extent()
+            if _inside(box, axis.bbox) and not any(box.overlaps(other) for other in taken):
+                taken.append(box)
+                break
+            text.remove()
+
+
+def _box(axis: Axes, place: Place) -> Bbox:
+    """Return the box of a mark [pixels]."""
+    x, y = axis.transData.transform(place)
+    return Bbox.from_extents(x - HALF_MARK, y - HALF_MARK, x + HALF_MARK, y + HALF_MARK)
+
+
+def _inside(box: Bbox, room: Bbox) -> bool:
+    return bool(box.x0 >= room.x0 and box.x1 <= room.x1 and box.y0 >= room.y0 and box.y1 <= room.y1)

@@ -48,6 +48,10 @@ class Reference:
     order: float | None
     floor: float
 
+    def error(self, value: float) -> float:
+        """Return the relative difference of a value from the reference."""
+        return abs(value - self.value) / abs(self.value)
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -152,57 +156,53 @@ def judge(
     Quantities in ``exact`` are compared with those values instead, where the axis converges to
     them. Quantities that are 0 in the reference, or that a point does not have, are left out.
     """
-    shared = [q for q in points[-1].values if all(q in point.values for point in points)]
+    last = points[-1]
+    shared = [q for q in last.values if all(q in point.values for point in points)]
     references = {q: _reference(axis, points, q, exact) for q in shared}
-    if axis.order is None and finest not in ("", points[-1].rung.name):
+    if axis.order is None and finest not in ("", last.rung.name):
         references = {q: replace(reference, floor=inf) for q, reference in references.items()}
     references = {q: reference for q, reference in references.items() if reference.value}
-    errors = [_errors(point, references) for point in points]
-    seconds = seconds_by_work(points)
-    convolutions = [float(point.cost.convolutions) for point in points]
-    bounds = [
-        max((e + references[q].floor for q, e in relative.items()), default=inf)
-        for relative in errors
+    errors = [
+        {q: reference.error(point.values[q]) for q, reference in references.items()}
+        for point in points
     ]
-    flags = zip(efficient(seconds, bounds), efficient(convolutions, bounds), strict=True)
+    bounds = [
+        max((error + references[q].floor for q, error in by_quantity.items()), default=inf)
+        for by_quantity in errors
+    ]
+    seconds = seconds_by_work(points)
+    quick = efficient(seconds, bounds)
+    few = efficient([float(point.cost.convolutions) for point in points], bounds)
     floor = max((reference.floor for reference in references.values()), default=0.0)
     judged = []
-    rows = zip(points, errors, bounds, seconds, flags, strict=True)
-    for point, relative, bound, spent, (quick, few) in rows:
-        worst = max(relative, key=lambda q: relative[q], default="")
-        error = relative.get(worst, inf)
-        worst = worst if error > 0.0 else ""
-        judged.append(Judged(point, error, worst, bound, spent, error < floor, quick, few))
+    rows = zip(points, errors, bounds, seconds, quick, few, strict=True)
+    for point, by_quantity, bound, time, by_seconds, by_convolutions in rows:
+        worst, error = max(by_quantity.items(), key=lambda pair: pair[1], default=("", inf))
+        worst, unresolved = worst if error > 0.0 else "", error < floor
+        judged.append(
+            Judged(point, error, worst, bound, time, unresolved, by_seconds, by_convolutions)
+        )
     return Ladder(axis, tuple(judged), references, failed)
 
 
 def _reference(
     axis: Approximation, points: Sequence[Point], quantity: str, exact: Mapping[str, float]
 ) -> Reference:
+    """Return the closed form, or the value of the last point with its error on its branch.
+
+    A branch without steps is a choice.
+    """
     last = points[-1]
-    value = last.values[quantity]
-    convergence = _convergence(axis, points, quantity)
+    value, convergence = last.values[quantity], Convergence(None, 0.0)
+    branch = {
+        step: point.values[quantity]
+        for point in points
+        if point.rung.branch == last.rung.branch and (step := point.rung.step) is not None
+    }
+    if axis.order is not None and branch:
+        noise = ROUNDING * abs(value)
+        convergence = richardson([*branch.values()], [*branch], axis.order, noise)
     if axis.closed_form and quantity in exact:
         return Reference(exact[quantity], True, convergence.order, 0.0)
-    return Reference(
-        value, False, convergence.order, convergence.error / abs(value) if value else 0.0
-    )
-
-
-def _convergence(axis: Approximation, points: Sequence[Point], quantity: str) -> Convergence:
-    """Return the convergence on the branch of the last point; one without steps is a choice."""
-    last = points[-1]
-    branch = [p for p in points if p.rung.branch == last.rung.branch and p.rung.step is not None]
-    if axis.order is None or not branch:
-        return Convergence(None, 0.0)
-    values = [point.values[quantity] for point in branch]
-    steps = [float(point.rung.step or nan) for point in branch]
-    return richardson(values, steps, axis.order, ROUNDING * abs(last.values[quantity]))
-
-
-def _errors(point: Point, references: Mapping[str, Reference]) -> dict[str, float]:
-    """Return the relative difference of each quantity from its reference."""
-    return {
-        quantity: abs(point.values[quantity] - reference.value) / abs(reference.value)
-        for quantity, reference in references.items()
-    }
+    floor = convergence.error / abs(value) if value else 0.0
+    return Reference(value, False, convergence.order, floor)

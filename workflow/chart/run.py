@@ -20,6 +20,7 @@ from pydantic_core import PydanticCustomError
 
 from workflow.analyses.wear.approximations.approximation import (
     Approximation,
+    Rung,
     entry_at,
     overrides_of,
 )
@@ -70,8 +71,7 @@ class Chart:
 class _Run:
     """Finished run of a setting; ``summary`` includes the middle sections of wear."""
 
-    case: Case
-    finished: Finished
+    folder: Path
     summary: Mapping[str, Any]
     cost: Cost
 
@@ -102,10 +102,10 @@ def chart_case(
     :class:`UserError` if an axis does not apply or a quantity does not exist.
     """
     base = (*overrides, *_plain(load_case(case, overrides), quantities))
-    settings = axes_of(case, base, axes)
+    written, settings = load_case(case, base), axes_of(case, base, axes)
     jobs = _jobs(case, base, settings)
     folder = OutputFolder(out, KIND)
-    _claim(folder, load_case(case, base))
+    _claim(folder, written)
     log = folder.reserve(LOG, "what it said, and when")
     with (
         environment({CACHE: str((out / STRUCTURES).absolute())}),
@@ -116,13 +116,12 @@ def chart_case(
     runs = _runs(ended)
     if not runs:
         raise MethodFailed(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
-    first = runs.get(BASELINE) or next(iter(runs.values()))
     failed = {end.job.name: end.error for end in ended if end.summary is None}
-    ladders = [
-        _ladder(axis, rungs, jobs, runs, left_out | failed, quantities)
-        for axis, rungs in settings.items()
-    ]
-    return Chart(first.case.title, tuple(ladders), accuracy, complete=not failed)
+    ladders = []
+    for axis, of_axis in settings.items():
+        rungs = [(setting.rung, jobs[setting.text].name) for setting in of_axis]
+        ladders.append(_ladder(axis, rungs, runs, left_out | failed, written, quantities))
+    return Chart(written.title, tuple(ladders), accuracy, complete=not failed)
 
 
 def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
@@ -231,8 +230,8 @@ class _Progress:
         name, now = finished.job.name, time.perf_counter()
         self._spent += self._times[name]
         self._ended += 1
-        told = f"{self._ended}/{self._total} {name}: {ending}"
-        self._reporter.say(told, always=finished.summary is None)
+        line = f"{self._ended}/{self._total} {name}: {ending}"
+        self._reporter.say(line, always=finished.summary is None)
         at = f"{self._ended} of {self._total}"
         self._reporter.reached(self._spent / sum(self._times.values()), at)
         if now - self._last < KEPT * own:
@@ -242,13 +241,12 @@ class _Progress:
 
 def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:
     """Return the finished runs, by the name of the job."""
-    completed = [(finished, finished.summary) for finished in ended if finished.summary is not None]
-    cases = [finished.job.load() for finished, _ in completed]
-    folders = [finished.folder for finished, _ in completed]
-    paid = costs(cases, folders, [summary for _, summary in completed])
+    completed = [(end, end.job.load(), end.summary) for end in ended if end.summary is not None]
+    cases, folders = [case for _, case, _ in completed], [end.folder for end, _, _ in completed]
+    paid = costs(cases, folders, [summary for *_, summary in completed])
     return {
-        finished.job.name: _Run(case, finished, _measured(case, finished.folder, summary), cost)
-        for (finished, summary), case, cost in zip(completed, cases, paid, strict=True)
+        end.job.name: _Run(end.folder, _measured(case, end.folder, summary), cost)
+        for (end, case, summary), cost in zip(completed, paid, strict=True)
     }
 
 
@@ -269,57 +267,46 @@ def _check(quantities: Sequence[str], summary: Mapping[str, Any]) -> None:
 
 def _ladder(
     axis: Approximation,
-    settings: Sequence[Setting],
-    jobs: Mapping[str, Job],
+    rungs: Sequence[tuple[Rung, str]],
     runs: Mapping[str, _Run],
     errors: Mapping[str, str],
+    case: Case,
     picked: Sequence[str],
 ) -> Ladder:
-    """Return the ladder of an axis, with its finished and its failed rungs."""
-    rungs = [(setting.rung, jobs[setting.text].name) for setting in settings]
-    completed = [(rung, runs[name]) for rung, name in rungs if name in runs]
+    """Return the ladder of an axis, with its finished and its failed rungs, by names of runs."""
     failed = {rung.name: errors[name] for rung, name in rungs if name in errors}
+    completed = [(rung, name) for rung, name in rungs if name in runs]
     if not completed:
         return Ladder(axis, (), {}, failed)
-    last = completed[-1][1]
-    wanted = _quantities(axis, runs.get(BASELINE, last), picked)
-    exact = {entry.quantity: entry.value for entry in last.case.expect if entry.exact}
-    points = [
-        Point(
-            rung=rung,
-            baseline=run.finished.job.name == BASELINE,
-            folder=run.finished.job.name,
-            values=_numbers(run.summary, wanted),
-            cost=run.cost,
-            extras=_extras(run, last),
-        )
-        for rung, run in completed
-    ]
+    last, comparison = runs[completed[-1][1]], analysis_of(case).comparison
+    wanted = _quantities(axis, case, runs.get(BASELINE, last).summary, picked)
+    points = []
+    for rung, name in completed:
+        run = runs[name]
+        extras = _numbers(run.summary, comparison.extras(run.summary))
+        extras |= comparison.apart(run.folder, last.folder, run.summary)
+        values = _numbers(run.summary, wanted)
+        points.append(Point(rung, name == BASELINE, name, values, run.cost, extras))
+    exact = {entry.quantity: entry.value for entry in case.expect if entry.exact}
     return judge(axis, points, exact, failed, finest=rungs[-1][0].name)
 
 
-def _quantities(axis: Approximation, run: _Run, picked: Sequence[str]) -> list[str]:
+def _quantities(
+    axis: Approximation, case: Case, summary: Mapping[str, Any], picked: Sequence[str]
+) -> list[str]:
     """Return the quantities by which the rungs of an axis are compared."""
-    comparison = analysis_of(run.case).comparison
+    comparison = analysis_of(case).comparison
     if axis.sections:
-        return comparison.sections(run.summary)
-    paths = list(picked)
-    if not paths:
-        # A relative error of a quantity that is 0 is not defined.
-        by_default = comparison.quantities(run.case, run.summary)
-        paths = [path for path in by_default if number_at(run.summary, path)]
+        return comparison.sections(summary)
+    # A relative error of a quantity that is 0 is not defined.
+    by_default = [p for p in comparison.quantities(case, summary) if number_at(summary, p)]
+    paths = list(picked) or by_default
     if axis.moves_states:
         paths = [p for p in paths if not FROM_THE_FIRST.match(p)] or list(comparison.at_the_end)
     return paths
 
 
 def _numbers(summary: Mapping[str, Any], paths: Sequence[str]) -> dict[str, float]:
+    """Return the numbers at the paths where there are any."""
     numbers = {path: number_at(summary, path) for path in paths}
     return {path: value for path, value in numbers.items() if value is not None}
-
-
-def _extras(run: _Run, last: _Run) -> dict[str, float]:
-    """Return further numbers of a run, and how far its fields are from those of the last run."""
-    comparison, folder = analysis_of(run.case).comparison, run.finished.folder
-    beside = _numbers(run.summary, comparison.extras(run.summary))
-    return beside | comparison.apart(folder, last.finished.folder, run.summary)

@@ -37,11 +37,12 @@ def _samples(case: Case) -> Iterator[Rung]:
         yield Rung(f"{samples} samples", {"resolution": resolution}, 1.0 / samples)
 
 
-OF_MOTION = tuple(
-    Approximation(name, what, ladder, (entry,), order=2.0)
-    for name, what, ladder, entry in (
-        ("step", "step of the motion in time", _time_steps, "integration.step"),
-        ("harmonics", "odd harmonics of the motion", _harmonics, "resolution.samples"),
-        ("samples", "samples of a period", _samples, "resolution.harmonics"),
-    )
+OF_MOTION = (
+    Approximation(
+        *("step", "step of the motion in time", _time_steps, ("integration.step",), 2.0),
+    ),
+    Approximation(
+        *("harmonics", "odd harmonics of the motion", _harmonics, ("resolution.samples",), 2.0),
+    ),
+    Approximation("samples", "samples of a period", _samples, ("resolution.harmonics",), 2.0),
 )

@@ -22,7 +22,7 @@ from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_low
 from workflow.analyses.wear.budget.probe_cases import ProbeCases, late, scaled
 from workflow.analyses.wear.budget.report import datasets_of, sentences, summary_of, warning_of
 from workflow.analyses.wear.checks import run_errors
-from workflow.analyses.wear.checks.run_errors import SETTINGS
+from workflow.analyses.wear.checks.run_errors import REMEDIES
 from workflow.analyses.wear.output.layout import PARTS
 from workflow.analyses.wear.output.outcome import InterfaceOutcome, peak_change
 from workflow.analyses.wear.structures import structure_of
@@ -105,12 +105,12 @@ def test_one_sign_is_the_sum_of_sizes() -> None:
 
 def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> None:
     errors = {"depth": ERROR, "worn_peak_pressure": ERROR}
-    assert warning_of("pad", errors, 0.05, SETTINGS) is None
-    line = warning_of("pad", errors, 0.04, SETTINGS)
+    assert warning_of("pad", errors, 0.05, REMEDIES) is None
+    line = warning_of("pad", errors, 0.04, REMEDIES)
     assert line is not None
     assert "depth 4.6%" in line
     assert "worn peak" not in line  # edges may be farther off
-    assert SETTINGS["mesh"] in line
+    assert REMEDIES["mesh"] in line
 
 
 def probe_cases_of(case) -> ProbeCases:

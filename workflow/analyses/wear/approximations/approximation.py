@@ -49,6 +49,20 @@ class Neighbour:
 
 
 @dataclass(frozen=True)
+class BudgetPart:
+    """Part of the error budget of a run that an approximation causes.
+
+    ``errors`` returns the errors by result of a contact, or None where the approximation does not
+    apply; those of the ``signed`` results have a known sign. ``remedy`` is what reduces them.
+    """
+
+    name: str
+    errors: Callable[[ContactErrors], ErrorByResult | None]
+    remedy: str
+    signed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Approximation:
     """A named approximation of the model or of its numerical solution.
 
@@ -73,13 +87,7 @@ class Approximation:
         Chooses the cheapest setting of a dovetail, given the case with earlier decisions and the
         error that the setting may cause; None if ``fidelity: auto`` keeps the setting.
     part
-        Name of its part of the error budget; empty if the budget has none.
-    errors
-        Returns the error due to it of each result of a contact, or None where it does not apply.
-    signed
-        Results whose error has a known sign.
-    remedy
-        Setting that reduces the error, by default the main one.
+        Its part of the error budget, if the budget has one.
     """
 
     name: str
@@ -91,10 +99,7 @@ class Approximation:
     moves_states: bool = False
     sections: bool = False
     decide: Callable[[Any, float], Decision] | None = None
-    part: str = ""
-    errors: Callable[[ContactErrors], ErrorByResult | None] | None = None
-    signed: tuple[str, ...] = ()
-    remedy: str = ""
+    part: BudgetPart | None = None
 
     def rungs(self, case: Case) -> Iterator[Rung]:
         """Return the settings of a case from coarse to fine, none if it lacks the entries."""

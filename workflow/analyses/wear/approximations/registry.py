@@ -7,128 +7,87 @@ its warnings read this list.
 from __future__ import annotations
 
 from workflow.analyses.wear.approximations import ladders
-from workflow.analyses.wear.approximations.approximation import Approximation
+from workflow.analyses.wear.approximations.approximation import Approximation, BudgetPart
 from workflow.analyses.wear.budget.parts import ContactErrors
 from workflow.analyses.wear.fidelity import decisions
 
+# Results whose error has a known sign. Steps and increments make some places of a surface too deep
+# and others too shallow, and nothing is known of the sign at worn edges.
+VOLUME = ("volume",)
+WEAR = "depth", *VOLUME
+WEAR_AND_PEAK = *WEAR, "peak_pressure"
+
 # Orders of convergence: the square-root end of a pressure keeps a grid from second order, friction
-# along a path of increments is of first order, and so is a residual in its tolerance. Signs: steps
-# and increments make some places of a surface too deep and others too shallow, and nothing is known
-# of the sign at worn edges.
+# along a path of increments is of first order, and so is a residual in its tolerance.
 APPROXIMATIONS = (
     Approximation(
-        name="grid",
-        what="cells of the contact grid",
-        ladder=ladders.grids,
+        *("grid", "cells of the contact grid", ladders.grids),
         entries=("contact.grid",),
         order=2.0,
         closed_form=True,
         decide=decisions.choose_grid,
-        part="grid",
-        errors=ContactErrors.grid,
-        signed=("depth", "volume", "peak_pressure"),
+        part=BudgetPart("grid", ContactErrors.grid, "contact.grid", WEAR_AND_PEAK),
     ),
     Approximation(
-        name="tolerance",
-        what="tolerance of the contact solver",
-        ladder=ladders.tolerances,
+        *("tolerance", "tolerance of the contact solver", ladders.tolerances),
         entries=("contact.tolerance",),
         order=1.0,
         decide=decisions.choose_tolerance,
-        part="solver",
-        errors=ContactErrors.solver,
+        part=BudgetPart("solver", ContactErrors.solver, "contact.tolerance"),
     ),
     Approximation(
-        name="method",
-        what="slip of the structure or of the half-space",
-        ladder=ladders.methods,
-        entries=("contact.method",),
+        "method", "slip of the structure or of the half-space", ladders.methods, ("contact.method",)
     ),
     Approximation(
-        name="stepper",
-        what="how wear steps, and how far",
-        ladder=ladders.steppers,
+        *("stepper", "how wear steps, and how far", ladders.steppers),
         entries=("wear.step.kind",),
         order=2.0,
         decide=decisions.choose_steps,
-        part="steps",
-        errors=ContactErrors.steps,
+        part=BudgetPart("steps", ContactErrors.steps, "wear.step"),
     ),
     Approximation(
-        name="dimension",
-        what="two dimensions or three",
-        ladder=ladders.dimensions,
-        entries=("structure.dimension",),
+        *("dimension", "two dimensions or three", ladders.dimensions, ("structure.dimension",)),
         sections=True,
+        decide=decisions.choose_dimension,
     ),
     Approximation(
-        name="coupling",
-        what="how often worn surfaces go back to the structure",
-        ladder=ladders.couplings,
+        *("coupling", "how often worn surfaces go back to the structure", ladders.couplings),
         entries=("coupling.drift",),
         decide=decisions.choose_drift,
-        part="coupling",
-        errors=ContactErrors.coupling,
-        signed=("depth", "volume"),
+        part=BudgetPart("coupling", ContactErrors.coupling, "coupling.resultants", WEAR),
     ),
     Approximation(
-        name="history",
-        what="increments of the load path",
-        ladder=ladders.histories,
-        entries=("contact.history",),
+        *("history", "increments of the load path", ladders.histories, ("contact.history",)),
         order=1.0,
         moves_states=True,
     ),
     Approximation(
-        name="increments",
-        what="increments of a cycle",
-        ladder=ladders.increments,
+        *("increments", "increments of a cycle", ladders.increments),
         entries=("load_path.increments",),
         order=2.0,
         decide=decisions.choose_increments,
-        part="increments",
-        errors=ContactErrors.increments,
-        signed=("volume",),
+        part=BudgetPart("increments", ContactErrors.increments, "load_path.increments", VOLUME),
     ),
     Approximation(
-        name="link",
-        what="half-spaces, or corrected by the structure's nodes",
-        ladder=ladders.links,
+        *("link", "half-spaces, or corrected by the structure's nodes", ladders.links),
         entries=("contact.link",),
         order=2.0,
-        part="link",
-        errors=ContactErrors.link,
-        signed=("depth", "volume"),
-        remedy="the mesh of the contact faces",
+        part=BudgetPart("link", ContactErrors.link, "the mesh of the contact faces", WEAR),
     ),
     Approximation(
-        name="mesh",
-        what="finite elements of the structure",
-        ladder=ladders.meshes,
+        *("mesh", "finite elements of the structure", ladders.meshes),
         entries=("mesh.flank_nodes", "mesh.pad_elements", "mesh.size"),
         order=2.0,
         decide=decisions.choose_mesh,
-        part="mesh",
-        errors=ContactErrors.mesh,
-        signed=("depth", "volume", "peak_pressure"),
-        remedy="the mesh of the structure",
+        part=BudgetPart("mesh", ContactErrors.mesh, "the mesh of the structure", WEAR_AND_PEAK),
     ),
+    Approximation("order", "order of the finite elements", ladders.orders, ("mesh.order",)),
     Approximation(
-        name="order",
-        what="order of the finite elements",
-        ladder=ladders.orders,
-        entries=("mesh.order",),
-    ),
-    Approximation(
-        name="reference",
-        what="half-space, or finite elements alone",
-        ladder=ladders.references,
+        *("reference", "half-space, or finite elements alone", ladders.references),
         entries=("structure.kind",),
         order=1.0,
     ),
 )
 
-PARTS = {
-    approximation.part: approximation for approximation in APPROXIMATIONS if approximation.part
-}
-"""Approximations by their part of the error budget."""
+PARTS = {known.part.name: known.part for known in APPROXIMATIONS if known.part is not None}
+"""Parts of the error budget by name."""

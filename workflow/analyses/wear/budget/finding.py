@@ -54,8 +54,7 @@ def errors_of(contact: ContactErrors) -> dict[str, ResultError]:
     """Return the errors of the results of one contact."""
     parts: dict[str, ErrorByResult] = {}
     for part in layout.PARTS:
-        estimate = PARTS[part].errors
-        if estimate is not None and (by_result := estimate(contact)) is not None:
+        if (by_result := PARTS[part].errors(contact)) is not None:
             parts[part] = by_result
     results = (*layout.WORN, *layout.PRESSURES)
     errors = {result: _error(parts, result) for result in results}

@@ -26,8 +26,8 @@ FEW_INCREMENTS = 32
 # fall to a quarter; the length of automatic steps is about proportional to the root of their
 # tolerance.
 SHORTER, STRICTER = 4.0, 10.0
-# Setting that reduces each part of the error, where it does not depend on the case.
-SETTINGS = {part: known.remedy or known.entries[0] for part, known in PARTS.items()}
+# What reduces each part of the error, where the case does not say more.
+REMEDIES = {part.name: part.remedy for part in PARTS.values()}
 
 
 def warn_of_errors(
@@ -45,7 +45,7 @@ def warn_of_errors(
     for contact in contacts:
         name, state, shorter = contact.stage.name, contact.state, shorter_steps(case.wear, contact)
         _warn_of_steps(case.wear, contact, shorter, reporter)
-        settings = {**SETTINGS, **structure_of(case).settings(case), "steps": shorter}
+        settings = {**REMEDIES, **structure_of(case).settings(case), "steps": shorter}
         settings |= _of_link_and_coupling(case, shorter, drift)
         if beyond := warning_of(name, budget[name], case.accuracy, settings):
             reporter.warn(beyond)

@@ -14,11 +14,12 @@ from workflow.analyses.wear.approximations.approximation import Approximation, e
 from workflow.analyses.wear.approximations.probe_runs import FAILURES
 from workflow.analyses.wear.approximations.registry import APPROXIMATIONS
 from workflow.analyses.wear.choice import Decision, record_of
-from workflow.analyses.wear.fidelity.dimension import choose_dimension
 from workflow.analyses.wear.fidelity.probe import LEGS
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.case.changing import changed
 
+# Largest share of the accuracy that two dimensions may use: other approximations need the rest.
+MOST_FOR_DIMENSION = 0.9
 # Approximations in the order of their decisions, and their shares of the error, which add up to 1:
 # the errors are assumed to have the same sign. Shares are large where accuracy is costly: the cost
 # of increments and wear steps grows with the root of 1 / error, that of meshes in space with the
@@ -38,10 +39,10 @@ def choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any]]:
     begin = time.perf_counter()
     if not any(case.legs):
         case = changed(case, case.divided(LEGS))  # until the increments are decided
-    decisions = [choose_dimension(case).timed(begin)]
+    by_name = {approximation.name: approximation for approximation in APPROXIMATIONS}
+    decisions = [_decide(by_name["dimension"], case, MOST_FOR_DIMENSION * case.accuracy)]
     case = changed(case, decisions[0].chosen)
     left = case.accuracy - (decisions[0].error or 0.0)
-    by_name = {approximation.name: approximation for approximation in APPROXIMATIONS}
     for name, share in SHARES.items():
         decisions.append(_decide(by_name[name], case, share * left))
         case = changed(case, decisions[-1].chosen)

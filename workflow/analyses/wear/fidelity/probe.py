@@ -7,13 +7,13 @@ a few per cent of the depth, is nearly the same in all of them and cancels in di
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
+from sa_solver.types import ElasticPair, Grid, LoadHistory, resultant_change
 from wear.contact.contacts import Contacts
 from wear.contact.tractions import acting_slip
 from wear.steps.implicit import ImplicitStepper
@@ -98,49 +98,41 @@ def _wearing(numbers: Numbers) -> Numbers:
     return numbers
 
 
-def _worn(depth: Array, grid: Grid) -> dict[str, float]:
-    return {"depth": float(depth.max()), "volume": float(depth.sum()) * grid.cell_area}
-
-
 # --- the profile along the slot -------------------------------------------------------------------
 
 
 def slot_wear(case: DovetailCase, cells: int) -> Numbers:
     """Return depth and volume of the profile along the slot, as a line contact of ``cells``.
 
-    Per length across the flank, it carries the section's load over the whole slot, and it slides
-    everywhere by the section's mean slip.
+    Per length across the flank, it carries the section's load over the whole slot, without moments,
+    and it slides everywhere by the section's mean slip.
     """
     structure = _structure(case)
     length, width = case.structure.slot_length, case.structure.face_width
     grid = Grid.strips(length, cells)
     contact = NormalContact(HalfSpace(grid, ElasticPair(case.material(1), case.material(2))))
     laws = case.wear_of(1).described(), case.wear_of(2).described()
-    geometry = case.structure.geometry()
+    geometry, cycles = case.structure.geometry(), case.wear.cycles
     numbers = {}
     for face, history in zip(structure.faces, structure.unworn(), strict=True):
-        loads = _along(history.loads, length / width)
-        slip = acting_slip(history.slip, history.loads).mean(axis=1)
+        carried, none = history.loads, np.zeros(len(history.loads))
+        P = length / width * carried.P
+        mix = carried.sliding, carried.share, carried.block
+        loads = LoadHistory(P, *(none,) * 7, *mix)
+        slip = acting_slip(history.slip, carried).mean(axis=1)
         sliding = SlidingCycle(loads, np.multiply.outer(slip, np.ones(grid.shape)))
         gap = geometry.flank_gap(np.zeros_like(grid.x), grid.x, SIDES[face.face.name])
         wearing = WearingContact(contact, laws, case.friction.at(0.0), sliding, TOLERANCE)
         state = WearState.unworn(np.ascontiguousarray(gap))
-        numbers[face.face.name] = _worn(_worn_away(wearing, state, case.wear.cycles), grid)
+        for _ in range(STEPS):
+            stepper, contact_at = ImplicitStepper(alone=True), partial(_same, wearing)
+            state = advance_cycles(stepper, state, cycles / STEPS, cycles, contact_at).state
+        depth = state.surfaces.depth
+        volume = float(depth.sum()) * grid.cell_area
+        numbers[face.face.name] = {"depth": float(depth.max()), "volume": volume}
     return _wearing(numbers)
 
 
-def _along(loads: LoadHistory, factor: float) -> LoadHistory:
-    """Return the loads of the profile: P of the section times a factor, without moments."""
-    none = np.zeros(len(loads))
-    return LoadHistory(
-        factor * loads.P, *(none,) * 7, loads.sliding, share=loads.share, block=loads.block
-    )
-
-
-def _worn_away(contact: WearingContact, state: WearState, cycles: float) -> Array:
-    """Return the worn depth of both bodies after ``cycles``."""
-    for _ in range(STEPS):
-        step = cycles / STEPS
-        stepper = ImplicitStepper(alone=True)
-        state = advance_cycles(stepper, state, step, cycles, lambda worn: contact).state
-    return state.surfaces.depth
+def _same(contact: WearingContact, state: WearState) -> WearingContact:
+    """Return the contact, which wear does not change."""
+    return contact
