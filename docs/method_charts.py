@@ -46,7 +46,7 @@ from workflow.analyses.wear.translation import structure_loads
 from workflow.chart.costs import Cost
 from workflow.chart.figures import axis_figure
 from workflow.chart.frontier import efficient
-from workflow.chart.ladder import Judged, Ladder, Point, judge
+from workflow.chart.ladder import Ladder, Point, judge
 from workflow.kinds import load_case
 from workflow.pictures.style import write_figures
 
@@ -203,14 +203,14 @@ def _nothing(case: Any) -> Any:
 
 def _judged(
     rung: Rung, own: bool, work: Callable[[], Result], error: Callable[[Result], float]
-) -> Judged:
+) -> Point:
     """Return a rung whose error is known."""
     result, seconds = _timed(work)
-    point, wrong = Point(rung, own, "", {}, Cost(seconds, 0, 0)), error(result)
-    return Judged(point, wrong, "", wrong, seconds, False, False, False)
+    wrong, cost = error(result), Cost(seconds, 0, 0)
+    return Point(rung, own, "", {}, cost, error=wrong, bound=wrong, seconds=seconds)
 
 
-def _ladder(axis: Approximation, rungs: list[Judged]) -> Ladder:
+def _ladder(axis: Approximation, rungs: list[Point]) -> Ladder:
     """Return a ladder of such rungs, with the efficient ones marked."""
     flags = efficient([rung.seconds for rung in rungs], [rung.error for rung in rungs])
     marked = [replace(rung, by_seconds=flag) for rung, flag in zip(rungs, flags, strict=True)]
@@ -263,7 +263,7 @@ def main(names: list[str]) -> None:
         chart, required = CHARTS[name]
         ladder = chart()
         for rung in ladder.rungs:
-            error, seconds = f"{100 * rung.error:.2g} %", f"{rung.point.cost.seconds:.2f} s"
+            error, seconds = f"{100 * rung.error:.2g} %", f"{rung.cost.seconds:.2f} s"
             print(f"{rung.name}: {error} {rung.worst}, {seconds}")  # noqa: T201
         with TemporaryDirectory() as folder:
             draw = partial(axis_figure, ladder, required)

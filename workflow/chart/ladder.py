@@ -21,18 +21,32 @@ SHORTEST = 1e-2
 
 @dataclass(frozen=True)
 class Point:
-    """Rung that has run.
+    """Setting of a ladder that has run, with its errors relative to the references.
 
     ``values`` are by quantity; ``extras`` are only reported. ``baseline`` marks the settings of the
-    case itself.
+    case itself. ``error`` is the largest relative difference, that of the quantity ``worst``;
+    ``bound`` adds the floor of the reference. ``unresolved`` means that the error is smaller than
+    the uncertainty of the references. ``seconds`` is the cost that decides: see
+    :func:`seconds_by_work`.
     """
 
-    rung: Rung
+    setting: Rung
     baseline: bool
     folder: str
     values: Mapping[str, float]
     cost: Cost
     extras: Mapping[str, float] = field(default_factory=dict)
+    error: float = inf
+    worst: str = ""
+    bound: float = inf
+    seconds: float = inf
+    unresolved: bool = False
+    by_seconds: bool = False
+    by_convolutions: bool = False
+
+    @property
+    def name(self) -> str:
+        return self.setting.name
 
 
 @dataclass(frozen=True)
@@ -54,34 +68,11 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Judged:
-    """Rung with its errors relative to the references.
-
-    ``error`` is its largest relative difference, that of the quantity ``worst``; ``bound`` adds the
-    floor of the reference. ``unresolved`` means that the error is smaller than the uncertainty of
-    the references. ``seconds`` is the cost that decides: see :func:`seconds_by_work`.
-    """
-
-    point: Point
-    error: float
-    worst: str
-    bound: float
-    seconds: float
-    unresolved: bool
-    by_seconds: bool
-    by_convolutions: bool
-
-    @property
-    def name(self) -> str:
-        return self.point.rung.name
-
-
-@dataclass(frozen=True)
 class Ladder:
     """Approximation with all of its runs; ``failed`` has a message for each that failed."""
 
     axis: Approximation
-    rungs: tuple[Judged, ...]
+    rungs: tuple[Point, ...]
     references: Mapping[str, Reference]
     failed: Mapping[str, str]
 
@@ -91,27 +82,27 @@ class Ladder:
         return max((reference.floor for reference in self.references.values()), default=nan)
 
     @property
-    def baseline(self) -> Judged | None:
+    def baseline(self) -> Point | None:
         """Rung with the settings of the case itself, or None if it did not run."""
-        return next((rung for rung in self.rungs if rung.point.baseline), None)
+        return next((rung for rung in self.rungs if rung.baseline), None)
 
     @property
     def scatter(self) -> float:
         """Relative scatter of the times: by how much they contradict the order of the work."""
-        excess = [rung.point.cost.seconds / rung.seconds - 1.0 for rung in self.rungs]
+        excess = [rung.cost.seconds / rung.seconds - 1.0 for rung in self.rungs]
         return max([TIMING, *excess])
 
-    def cheapest(self, accuracy: float) -> Judged | None:
+    def cheapest(self, accuracy: float) -> Point | None:
         """Return the rung of least cost whose error is certainly at most ``accuracy``.
 
         On a branch this is the coarsest such rung, whatever the measured times are. Branches are
         compared by seconds, and by convolutions where their seconds differ within the scatter.
         """
         met = [rung for rung in self.rungs if rung.bound <= accuracy]
-        met = [rung for rung in met if not any(_finer(rung.point, other.point) for other in met)]
+        met = [rung for rung in met if not any(_finer(rung, other) for other in met)]
         least = min((rung.seconds for rung in met), default=0.0)
         quick = [rung for rung in met if rung.seconds <= (1.0 + self.scatter) * least]
-        return min(quick, key=lambda rung: rung.point.cost.convolutions, default=None)
+        return min(quick, key=lambda rung: rung.cost.convolutions, default=None)
 
     def options(self) -> list[Option]:
         """Return the rungs as choices, with costs relative to that of the case's own settings."""
@@ -136,8 +127,8 @@ def seconds_by_work(points: Sequence[Point]) -> list[float]:
 
 def _finer(one: Point, other: Point) -> bool:
     """Return whether ``one`` is a finer rung of the branch of ``other``."""
-    step, coarser = one.rung.step, other.rung.step
-    if one.rung.branch != other.rung.branch or step is None or coarser is None:
+    step, coarser = one.setting.step, other.setting.step
+    if one.setting.branch != other.setting.branch or step is None or coarser is None:
         return False
     return step < coarser
 
@@ -159,30 +150,24 @@ def judge(
     last = points[-1]
     shared = [q for q in last.values if all(q in point.values for point in points)]
     references = {q: _reference(axis, points, q, exact) for q in shared}
-    if axis.order is None and finest not in ("", last.rung.name):
+    if axis.order is None and finest not in ("", last.setting.name):
         references = {q: replace(reference, floor=inf) for q, reference in references.items()}
     references = {q: reference for q, reference in references.items() if reference.value}
-    errors = [
-        {q: reference.error(point.values[q]) for q, reference in references.items()}
-        for point in points
-    ]
-    bounds = [
-        max((error + references[q].floor for q, error in by_quantity.items()), default=inf)
-        for by_quantity in errors
-    ]
-    seconds = seconds_by_work(points)
-    quick = efficient(seconds, bounds)
-    few = efficient([float(point.cost.convolutions) for point in points], bounds)
     floor = max((reference.floor for reference in references.values()), default=0.0)
     judged = []
-    rows = zip(points, errors, bounds, seconds, quick, few, strict=True)
-    for point, by_quantity, bound, time, by_seconds, by_convolutions in rows:
-        worst, error = max(by_quantity.items(), key=lambda pair: pair[1], default=("", inf))
-        worst, unresolved = worst if error > 0.0 else "", error < floor
-        judged.append(
-            Judged(point, error, worst, bound, time, unresolved, by_seconds, by_convolutions)
-        )
-    return Ladder(axis, tuple(judged), references, failed)
+    for point, seconds in zip(points, seconds_by_work(points), strict=True):
+        errors = {q: reference.error(point.values[q]) for q, reference in references.items()}
+        worst = max(errors, key=errors.__getitem__, default="")
+        error = errors.get(worst, inf)
+        bound = max((e + references[q].floor for q, e in errors.items()), default=inf)
+        point = replace(point, error=error, bound=bound, unresolved=error < floor)
+        judged.append(replace(point, seconds=seconds, worst=worst if error > 0.0 else ""))
+    bounds = [point.bound for point in judged]
+    by_seconds = efficient([point.seconds for point in judged], bounds)
+    by_convolutions = efficient([float(point.cost.convolutions) for point in judged], bounds)
+    flags = zip(judged, by_seconds, by_convolutions, strict=True)
+    rungs = [replace(p, by_seconds=quick, by_convolutions=few) for p, quick, few in flags]
+    return Ladder(axis, tuple(rungs), references, failed)
 
 
 def _reference(
@@ -197,7 +182,7 @@ def _reference(
     branch = {
         step: point.values[quantity]
         for point in points
-        if point.rung.branch == last.rung.branch and (step := point.rung.step) is not None
+        if point.setting.branch == last.setting.branch and (step := point.setting.step) is not None
     }
     if axis.order is not None and branch:
         noise = ROUNDING * abs(value)

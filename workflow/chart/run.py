@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import chain
@@ -183,8 +183,9 @@ def _run(
     left_out = {}
     for setting in chain.from_iterable(settings.values()):
         if why := _too_long(setting, ended[0].summary or {}):
-            left_out[jobs[setting.text].name] = why
-    progress.leave_out(left_out)
+            name = jobs[setting.text].name
+            left_out[name] = why
+            progress.times.pop(name, None)
     others = [job for job in others if job.name not in left_out]
     ended += run_jobs(others, out, alone=True, report=progress, running=progress.running)
     return ended, left_out
@@ -204,19 +205,14 @@ def _too_long(setting: Setting, summary: Mapping[str, Any]) -> str:
 class _Progress:
     """Reporter of each run as it ends, and of the remaining time.
 
-    Runs are weighted by their time estimates, because the time grows from rung to rung.
+    Runs are weighted by the estimates of their ``times``, which grow from rung to rung.
     """
 
     def __init__(self, jobs: Mapping[str, Job], reporter: Reporter) -> None:
         self._reporter, self._spent, self._ended = reporter, 0.0, 0
         self._total, self._last = len(jobs), time.perf_counter()
         cases = {job.name: job.load() for job in jobs.values()}
-        self._times = {n: analysis_of(case).run_time(case).seconds for n, case in cases.items()}
-
-    def leave_out(self, names: Iterable[str]) -> None:
-        """Remove runs that will not take place."""
-        for name in names:
-            self._times.pop(name, None)
+        self.times = {n: analysis_of(case).run_time(case).seconds for n, case in cases.items()}
 
     def running(self, names: Sequence[str]) -> None:
         """Report the names of the runs in progress."""
@@ -228,12 +224,12 @@ class _Progress:
             own = sum(finished.summary.get("seconds", {}).values())
             ending = f"{own:.1f} s"
         name, now = finished.job.name, time.perf_counter()
-        self._spent += self._times[name]
+        self._spent += self.times[name]
         self._ended += 1
         line = f"{self._ended}/{self._total} {name}: {ending}"
         self._reporter.say(line, always=finished.summary is None)
         at = f"{self._ended} of {self._total}"
-        self._reporter.reached(self._spent / sum(self._times.values()), at)
+        self._reporter.reached(self._spent / sum(self.times.values()), at)
         if now - self._last < KEPT * own:
             self._reporter.goes_on()
         self._last = now

@@ -185,7 +185,7 @@ def test_a_closed_form_is_the_reference_where_the_axis_goes_to_it():
 def test_the_bound_holds_against_the_true_limit():
     ladder = judge(GRID, second_order(), {}, {})
     for rung in ladder.rungs:
-        values = rung.point.values
+        values = rung.values
         true = max(abs(values["depth"] - 1.0) / 1.0, abs(values["volume"] - 2.0) / 2.0)
         assert rung.bound == pytest.approx(true, rel=0.15)
 
@@ -230,8 +230,8 @@ def test_sentences_say_when_nothing_is_enough():
 
 @pytest.mark.slow
 def test_files_of_a_chart(tmp_path: Path):
-    told = write_chart(charted(0.1), tmp_path)
-    assert told["figure"] == tmp_path / "figures/chart_all.png"
+    written = write_chart(charted(0.1), tmp_path)
+    assert written["figure"] == tmp_path / "figures/chart_all.png"
     lines = (tmp_path / "chart.csv").read_text("utf-8").splitlines()
     assert len(lines) == 6
     assert lines[0].startswith("axis,branch,rung,settings,own,folder,depth,volume,error")

@@ -15,7 +15,7 @@ from fe_models.meshes.structure_mesh import MeshError
 from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import settings
 from workflow.analyses.wear import run
-from workflow.analyses.wear.approximations import probe_runs
+from workflow.analyses.wear.approximations import probe_runs, registry
 from workflow.analyses.wear.approximations.probe_runs import STEPS, Numbers, probe_run
 from workflow.analyses.wear.budget import finding, probe_cases
 from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_lowered
@@ -23,6 +23,7 @@ from workflow.analyses.wear.budget.probe_cases import ProbeCases, late, scaled
 from workflow.analyses.wear.budget.report import datasets_of, sentences, summary_of, warning_of
 from workflow.analyses.wear.checks import run_errors
 from workflow.analyses.wear.checks.run_errors import REMEDIES
+from workflow.analyses.wear.fidelity.choosing import SHARES
 from workflow.analyses.wear.output.layout import PARTS
 from workflow.analyses.wear.output.outcome import InterfaceOutcome, peak_change
 from workflow.analyses.wear.structures import structure_of
@@ -111,6 +112,13 @@ def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> N
     assert "depth 4.6%" in line
     assert "worn peak" not in line  # edges may be farther off
     assert REMEDIES["mesh"] in line
+
+
+def test_every_part_of_the_budget_is_an_approximation() -> None:
+    """The registry names all parts and all settings that ``fidelity: auto`` decides."""
+    assert {*registry.PARTS} == {*PARTS}
+    decided = {known.name for known in registry.APPROXIMATIONS if known.decide is not None}
+    assert decided == {"dimension", *SHARES}
 
 
 def probe_cases_of(case) -> ProbeCases:

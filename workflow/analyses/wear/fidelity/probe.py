@@ -7,7 +7,7 @@ a few per cent of the depth, is nearly the same in all of them and cancels in di
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
@@ -123,16 +123,11 @@ def slot_wear(case: DovetailCase, cells: int) -> Numbers:
         sliding = SlidingCycle(loads, np.multiply.outer(slip, np.ones(grid.shape)))
         gap = geometry.flank_gap(np.zeros_like(grid.x), grid.x, SIDES[face.face.name])
         wearing = WearingContact(contact, laws, case.friction.at(0.0), sliding, TOLERANCE)
-        state = WearState.unworn(np.ascontiguousarray(gap))
+        state, contact_at = WearState.unworn(np.ascontiguousarray(gap)), lambda _, c=wearing: c
         for _ in range(STEPS):
-            stepper, contact_at = ImplicitStepper(alone=True), partial(_same, wearing)
+            stepper = ImplicitStepper(alone=True)
             state = advance_cycles(stepper, state, cycles / STEPS, cycles, contact_at).state
         depth = state.surfaces.depth
         volume = float(depth.sum()) * grid.cell_area
         numbers[face.face.name] = {"depth": float(depth.max()), "volume": volume}
     return _wearing(numbers)
-
-
-def _same(contact: WearingContact, state: WearState) -> WearingContact:
-    """Return the contact, which wear does not change."""
-    return contact
