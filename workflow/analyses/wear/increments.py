@@ -23,6 +23,7 @@ from fe_models.structure import InterfaceHistory
 from sa_solver.cycles.increments import depth_and_energy, errors_of_increments, friction_work
 from sa_solver.types import Array, Mask
 from workflow.analyses.wear.approximations.convergence import share_of_difference
+from workflow.analyses.wear.approximations.ladders import INCREMENTS_ORDER
 from workflow.analyses.wear.approximations.probe_runs import LESSER_INTERFACE
 from workflow.analyses.wear.case.base import MOST_INCREMENTS, FiniteElementCase
 from workflow.analyses.wear.choice import Decision, record_of
@@ -34,8 +35,6 @@ from workflow.models.structure_model import StructureModel
 # Least increments of a leg. Two cause 6 % of error in the depth of a dovetail but an estimate of
 # 0.2 %, because the estimate sees curvature within an increment only through its neighbours.
 FEWEST = 4
-# Order of convergence.
-ORDER = 2.0
 # Least and largest factor of refinement from one try to the next: where fronts of slip pass node by
 # node, the order is nearer to one than to two.
 FINER, FINEST = 1.4, 2.0
@@ -123,7 +122,7 @@ class _Cycle(Generic[AnyCase]):
         coarse, fine = self._solved(counts), self._solved(tuple(2 * count for count in counts))
         if coarse is None or fine is None:
             return UNKNOWN
-        share = share_of_difference(2.0, ORDER)
+        share = share_of_difference(2.0, INCREMENTS_ORDER)
         return share * float(differences(coarse, fine).max())
 
 

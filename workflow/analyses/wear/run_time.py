@@ -91,11 +91,9 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
     plane = getattr(case.structure, "dimension", 3) == 2 or case.contact.grid[1] == 1
     grids = [terms.grid[:1] if plane else terms.grid for terms in case.every_terms]
     cells = sum(map(prod, grids)) // len(grids)
-    at_once = min(extent.faces, os.cpu_count() or 1)
-    shared = extent.faces / at_once
-    taken = steps_of(case, extent)
-    steps, jumps = taken.count, taken.jumps
-    normal = NORMAL_LINE if plane else NORMAL
+    shared = extent.faces / min(extent.faces, os.cpu_count() or 1)
+    expected = steps_of(case, extent)
+    steps, jumps, normal = expected.count, expected.jumps, NORMAL_LINE if plane else NORMAL
     in_a_step = extent.increments * extent.dissipating * PROBLEMS[case.wear.step.kind]
     begun = solves(2 * extent.increments, cells, normal)
     worn = solves(steps * in_a_step, cells, normal)
@@ -115,8 +113,8 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
     before = shared * begun + _condensation(extent) + CYCLES * cycle
     after = PICTURES + WORN * factors(extent.nodes) + cycle + _stress(case, extent, cells)
     after += _probe_runs(case, extent, plane)
-    assumed = counted(ceil(jumps), "wear jump") if taken.unknown else ""
-    return RunTime(before, shared * worn + again * cycle, after, assumed, taken.unknown)
+    assumed = counted(ceil(jumps), "wear jump") if expected.unknown else ""
+    return RunTime(before, shared * worn + again * cycle, after, assumed, expected.unknown)
 
 
 def steps_of(case: WearCase, extent: Extent) -> ExpectedSteps:
@@ -135,26 +133,22 @@ def steps_of(case: WearCase, extent: Extent) -> ExpectedSteps:
         return ExpectedSteps(steps, RECORDED)
     for size in ("depth", "volume"):
         if (worn := getattr(step, size)) is not None:
-            end = getattr(wear.stop, size)
-            if end is not None:
+            if (end := getattr(wear.stop, size)) is not None:
                 return ExpectedSteps(ceil(end / worn), ceil(end / worn))
             return ExpectedSteps(BY_SIZE, BY_SIZE, UNKNOWN.format(f"the {size} worn"))
-    finer = 1.0 if wear.depth_tolerance is not None else max(1.0, sqrt(0.01 / wear.tolerance))
+    steps, unknown = float(AUTOMATIC), ""
     if case.contact.method == "full":
-        return ExpectedSteps(
-            finer * AUTOMATIC_FULL, 0.5 * finer * AUTOMATIC_FULL, UNKNOWN.format(STICKING)
-        )
-    return ExpectedSteps(finer * AUTOMATIC, 0.5 * finer * AUTOMATIC)
+        steps, unknown = AUTOMATIC_FULL, UNKNOWN.format(STICKING)
+    if wear.depth_tolerance is None:
+        steps *= max(1.0, sqrt(0.01 / wear.tolerance))
+    return ExpectedSteps(steps, 0.5 * steps, unknown)
 
 
 def _stable(case: WearCase, extent: Extent) -> float:
     """Return an estimate of the longest stable explicit step [cycles]."""
     bodies = [case.material(number) for number in (1, 2)]
     compliance = sum((1.0 - body.poisson**2) / body.young for body in bodies)
-    worn = 0.0
-    for number in (1, 2):
-        law = case.wear_of(number)
-        worn += law.rate(case.friction.coefficient)
+    worn = sum(case.wear_of(number).rate(case.friction.coefficient) for number in (1, 2))
     size = getattr(case.contact, "size", None) or getattr(case.structure, "size", None)
     length = size[0] if isinstance(size, tuple) else (size or 10.0)
     pitch = length / case.contact.grid[0]

@@ -17,13 +17,12 @@ VOLUME = ("volume",)
 WEAR = "depth", *VOLUME
 WEAR_AND_PEAK = *WEAR, "peak_pressure"
 
-# Orders of convergence: the square-root end of a pressure keeps a grid from second order, friction
-# along a path of increments is of first order, and so is a residual in its tolerance.
+# Friction along a path of increments is of first order, and so is a residual in its tolerance.
 APPROXIMATIONS = (
     Approximation(
         *("grid", "cells of the contact grid", ladders.grids),
         entries=("contact.grid",),
-        order=2.0,
+        order=ladders.GRID_ORDER,
         closed_form=True,
         decide=decisions.choose_grid,
         part=BudgetPart("grid", ContactErrors.grid, "contact.grid", WEAR_AND_PEAK),
@@ -64,20 +63,20 @@ APPROXIMATIONS = (
     Approximation(
         *("increments", "increments of a cycle", ladders.increments),
         entries=("load_path.increments",),
-        order=2.0,
+        order=ladders.INCREMENTS_ORDER,
         decide=decisions.choose_increments,
         part=BudgetPart("increments", ContactErrors.increments, "load_path.increments", VOLUME),
     ),
     Approximation(
         *("link", "half-spaces, or corrected by the structure's nodes", ladders.links),
         entries=("contact.link",),
-        order=2.0,
+        order=ladders.MESH_ORDER,
         part=BudgetPart("link", ContactErrors.link, "the mesh of the contact faces", WEAR),
     ),
     Approximation(
         *("mesh", "finite elements of the structure", ladders.meshes),
         entries=("mesh.flank_nodes", "mesh.pad_elements", "mesh.size"),
-        order=2.0,
+        order=ladders.MESH_ORDER,
         decide=decisions.choose_mesh,
         part=BudgetPart("mesh", ContactErrors.mesh, "the mesh of the structure", WEAR_AND_PEAK),
     ),

@@ -12,6 +12,7 @@ import numpy as np
 from sa_solver.types import Array, Progress, unseen
 from workflow.analyses.wear.approximations.approximation import Neighbour
 from workflow.analyses.wear.approximations.convergence import share_of_difference
+from workflow.analyses.wear.approximations.ladders import GRID_ORDER
 from workflow.analyses.wear.approximations.probe_runs import (
     STEPS,
     UNCHECKED_FAILURES,
@@ -27,8 +28,6 @@ from workflow.case.changing import changed
 if TYPE_CHECKING:
     from workflow.models.loads import LoadSource
 
-# Order of convergence of wear in the size of the contact cells.
-ORDER = 2.0
 # Cells along a direction of the contact of a probe run: at most half of the case's, and no coarser
 # grid has fewer than the least number. Line contacts use the largest number, since they are cheap.
 MOST_CELLS, FEWEST = 64, 8
@@ -81,12 +80,13 @@ class ProbeCases(Generic[AnyWearCase]):
         neighbours = {} if finer is None else {"mesh": finer}
         if (other := _other_grid(grid, case.contact.grid, line)) is not None:
             # The error of the case is smaller than that of the probe case by the last factor.
-            share = share_of_difference(other[0] / grid[0], ORDER) * (grid[0] / across) ** ORDER
+            refined, coarser = other[0] / grid[0], (grid[0] / across) ** GRID_ORDER
+            share = share_of_difference(refined, GRID_ORDER) * coarser
             neighbours["grid"] = Neighbour({"contact.grid": other}, share)
         if own.contact.link != "corrected":
             neighbours["link"] = Neighbour({"contact.link": "corrected"})
         finer_cells = {
-            name: (across / case.terms(name).grid[0]) ** ORDER for name in case.contact_names
+            name: (across / case.terms(name).grid[0]) ** GRID_ORDER for name in case.contact_names
         }
         coupled = isinstance(case, FiniteElementCase)
         return cls(own, section is None, coupled, neighbours, finer_cells)

@@ -13,9 +13,9 @@ from operator import itemgetter
 
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.meshes.transfer import FaceTransfer
+from workflow.analyses.wear.approximations import ladders
 from workflow.analyses.wear.approximations.approximation import Settings
 from workflow.analyses.wear.approximations.convergence import richardson
-from workflow.analyses.wear.approximations.ladders import FEWEST_CELLS, flank_mesh
 from workflow.analyses.wear.approximations.probe_runs import STEPS, Numbers, scales
 from workflow.analyses.wear.budget.parts import ERROR_PER_TOLERANCE
 from workflow.analyses.wear.case.sections import SIZES
@@ -41,8 +41,6 @@ from workflow.errors import MethodFailed
 # for slip and energy of the lesser flank, which scatter by 4 %. Fewer rows blur the ends.
 NODES_ACROSS, ROWS_PER_WIDTH = 8, 3
 DIMENSION = "structure.dimension"
-# Highest order of convergence of meshes and grids.
-ORDER = 2.0
 # Elements across a flank: fewer give no useful estimate, and the largest number takes seconds to
 # condense in the plane. In space the time grows with the fourth power, so the mesh is never made
 # finer than that of the case; meshes up to the last factor estimate its error.
@@ -139,12 +137,13 @@ def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
     numbers = _doublings(written, FEWEST_ELEMENTS, FINER_MESH * written if in_space else most)
 
     def settings(elements: int) -> Settings:
-        return flank_mesh(case, elements / written)
+        return ladders.flank_mesh(case, elements / written)
 
     def worn(elements: int) -> Numbers:
         return section_wear(changed(section, settings(elements)))
 
-    return _climb("elements across the flank", numbers, most, settings, worn, allowed)
+    order = ladders.MESH_ORDER
+    return _climb("elements across the flank", numbers, most, settings, worn, allowed, order)
 
 
 def choose_grid(case: DovetailCase, allowed: float) -> Decision:
@@ -154,8 +153,10 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
     part = 0.5 * allowed if in_space else allowed
 
     def climb(unit: str, cells: int, most: int, worn: Callable[[int], Numbers]) -> Decision:
-        numbers = _doublings(cells, max(FEWEST_CELLS, cells // COARSER), most)
-        return _climb(unit, numbers, most, lambda number: {unit: number}, worn, part)
+        numbers = _doublings(cells, max(ladders.FEWEST_CELLS, cells // COARSER), most)
+        return _climb(
+            unit, numbers, most, lambda number: {unit: number}, worn, part, ladders.GRID_ORDER
+        )
 
     def worn(cells: int) -> Numbers:
         return section_wear(changed(section, {"contact.grid": (cells, cells)}))
@@ -193,6 +194,7 @@ def _climb(
     settings: Callable[[int], Settings],
     worn: Callable[[int], Numbers],
     allowed: float,
+    order: float,
 ) -> Decision:
     """Probe ever larger numbers until one is accurate enough, or else take the largest offered.
 
@@ -203,7 +205,7 @@ def _climb(
         values.append(worn(number))
         if len(values) < min(LEAST_RUNGS, len(numbers)):
             continue
-        by_quantity = estimate(values, [1.0 / n for n in numbers[: len(values)]], ORDER)
+        by_quantity = estimate(values, [1.0 / n for n in numbers[: len(values)]], order)
         errors = [max(of_rung) for of_rung in zip(*by_quantity.values(), strict=True)]
         offered = [k for k in range(len(values)) if numbers[k] <= most]
         enough = [k for k in offered if errors[k] <= allowed]
@@ -269,7 +271,8 @@ def choose_drift(case: DovetailCase, allowed: float) -> Decision:
     apart = section_wear(section)
     coupled, drift = coupled_wear(section)
     # Loads updated at the end of each step lag by half a step, one step in all for a steady drift.
-    largest = max(last for _, last in estimate([apart, coupled], [2.0, 1.0], ORDER).values())
+    # Two values give their difference, whatever the order.
+    largest = max(last for _, last in estimate([apart, coupled], [2.0, 1.0], 1.0).values())
     effect = largest * STEPS / (STEPS - 1)
     bounded = max(LEAST_DRIFT, min(1.0, drift * allowed / effect)) if effect > 0.0 else 1.0
     settings = {"coupling.drift": bounded, "coupling.resultants": "drift"}

@@ -7,7 +7,7 @@ from math import pi, prod
 from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.approximations.approximation import Neighbour
-from workflow.analyses.wear.approximations.ladders import flank_mesh
+from workflow.analyses.wear.approximations.ladders import MESH_ORDER, flank_mesh
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
 from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
@@ -95,7 +95,7 @@ def _finer(case: DovetailCase) -> Neighbour:
     """
     from workflow.analyses.wear.approximations.convergence import share_of_difference
 
-    share = 1.0 if case.mesh.order == 1 else share_of_difference(2.0, 2.0)
+    share = 1.0 if case.mesh.order == 1 else share_of_difference(2.0, MESH_ORDER)
     return Neighbour({**flank_mesh(case, 2.0), "mesh.order": 2}, share)
 
 
