@@ -40,13 +40,13 @@ from sa_solver.types import Array
 from wear import findley
 from wear.cracking.life import PlaneSearch
 from workflow.analyses.specimens.model import SpecimensModel
+from workflow.analyses.wear.approximations.approximation import Approximation, Rung
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import structure_loads
-from workflow.chart.axes import Axis, Rung
 from workflow.chart.costs import Cost
 from workflow.chart.figures import axis_figure
 from workflow.chart.frontier import efficient
-from workflow.chart.ladder import Judged, Ladder, Point, judge
+from workflow.chart.ladder import Ladder, Point, judge
 from workflow.kinds import load_case
 from workflow.pictures.style import write_figures
 
@@ -70,7 +70,9 @@ PLANES, HISTORIES = {0: (10, 30, 100, 300, 1000), 6: (10, 30, 100, 300)}, 300
 
 def structure() -> Ladder:
     """Chart the unworn cycle of the dovetail's section, on meshes of both orders."""
-    axis = Axis("structure", "nodes across a flank of the dovetail's section", _nothing, order=2.0)
+    axis = Approximation(
+        "structure", "nodes across a flank of the dovetail's section", _nothing, order=2.0
+    )
     return judge(axis, _meshes("dovetail_2d", "nodes", NODES, 40, _mission), {}, {})
 
 
@@ -91,7 +93,7 @@ def _mission(case: Any) -> dict[str, float]:
 
 def specimens() -> Ladder:
     """Chart the curved specimens, unworn under 250 N, on meshes of both orders."""
-    axis = Axis("specimens", "elements across the pad", _nothing, order=2.0)
+    axis = Approximation("specimens", "elements across the pad", _nothing, order=2.0)
     return judge(axis, _meshes("specimens_curved", "elements", ELEMENTS, 10, _cycle), {}, {})
 
 
@@ -144,13 +146,15 @@ def history() -> Ladder:
 
     rungs = []
     for count in INCREMENTS:
-        rung = Rung(f"as given, {count} a leg", (), 1.0 / count, "as given")
+        rung = Rung(f"as given, {count} a leg", {}, 1.0 / count, "as given")
         rungs.append(_judged(rung, False, partial(in_increments, count), error))
     for accuracy in ACCURACIES:
         branch = "split to contact.accuracy"
-        rung = Rung(f"{branch}, {100 * accuracy:g} %", (), accuracy, branch)
+        rung = Rung(f"{branch}, {100 * accuracy:g} %", {}, accuracy, branch)
         rungs.append(_judged(rung, accuracy == ACCURACY, partial(to_accuracy, accuracy), error))
-    axis = Axis("history", "increments of unlike bodies, pressed and sheared", _nothing, order=1.0)
+    axis = Approximation(
+        "history", "increments of unlike bodies, pressed and sheared", _nothing, order=1.0
+    )
     return _ladder(axis, rungs)
 
 
@@ -173,10 +177,12 @@ def planes() -> Ladder:
     for refinements, counts in PLANES.items():
         for count in counts:
             branch = f"refined {refinements} times" if refinements else "a lattice alone"
-            rung = Rung(f"{branch}, {count} planes", (), count**-0.5, branch)
+            rung = Rung(f"{branch}, {count} planes", {}, count**-0.5, branch)
             own = PlaneSearch(count, refinements) == PlaneSearch()
             rungs.append(_judged(rung, own, partial(search, count, refinements), error))
-    axis = Axis("planes", f"search for the worst plane, {HISTORIES} histories", _nothing, order=2.0)
+    axis = Approximation(
+        "planes", f"search for the worst plane, {HISTORIES} histories", _nothing, order=2.0
+    )
     return _ladder(axis, rungs)
 
 
@@ -197,14 +203,14 @@ def _nothing(case: Any) -> Any:
 
 def _judged(
     rung: Rung, own: bool, work: Callable[[], Result], error: Callable[[Result], float]
-) -> Judged:
+) -> Point:
     """Return a rung whose error is known."""
     result, seconds = _timed(work)
-    point, wrong = Point(rung, own, "", {}, Cost(seconds, 0, 0)), error(result)
-    return Judged(point, wrong, "", wrong, seconds, False, False, False)
+    wrong, cost = error(result), Cost(seconds, 0, 0)
+    return Point(rung, own, "", {}, cost, error=wrong, bound=wrong, seconds=seconds)
 
 
-def _ladder(axis: Axis, rungs: list[Judged]) -> Ladder:
+def _ladder(axis: Approximation, rungs: list[Point]) -> Ladder:
     """Return a ladder of such rungs, with the efficient ones marked."""
     flags = efficient([rung.seconds for rung in rungs], [rung.error for rung in rungs])
     marked = [replace(rung, by_seconds=flag) for rung, flag in zip(rungs, flags, strict=True)]
@@ -224,7 +230,7 @@ def _meshes(
     for order, counts in meshes.items():
         for count in counts:
             values, seconds = _timed(partial(measured, _on_mesh(name, order, count / default)))
-            rung = Rung(f"order {order}, {count} {what}", (), 1.0 / count, f"order {order}")
+            rung = Rung(f"order {order}, {count} {what}", {}, 1.0 / count, f"order {order}")
             own = (order, count) == (DEFAULT_ORDER, default)
             points.append(Point(rung, own, "", values, Cost(seconds, 0, 0)))
     return points
@@ -257,7 +263,7 @@ def main(names: list[str]) -> None:
         chart, required = CHARTS[name]
         ladder = chart()
         for rung in ladder.rungs:
-            error, seconds = f"{100 * rung.error:.2g} %", f"{rung.point.cost.seconds:.2f} s"
+            error, seconds = f"{100 * rung.error:.2g} %", f"{rung.cost.seconds:.2f} s"
             print(f"{rung.name}: {error} {rung.worst}, {seconds}")  # noqa: T201
         with TemporaryDirectory() as folder:
             draw = partial(axis_figure, ladder, required)

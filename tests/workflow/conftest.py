@@ -409,13 +409,13 @@ def _all_here() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _without_companions() -> Iterator[None]:
-    """Switch off the step-doubling runs of the error estimate, which take seconds.
+def _without_probe_runs() -> Iterator[None]:
+    """Switch off the probe runs of the error budget, which take seconds.
 
     test_error_budget.py tests them.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(wear_run, "lives_of_companions", lambda *_: lambda *_: {})
+        patch.setattr(wear_run, "begin_probe_runs", lambda *_: lambda *_: {})
         yield
 
 

@@ -11,12 +11,18 @@ Chosen = TypeVar("Chosen", bound=Section)
 
 
 def changed(section: Chosen, values: Mapping[str, Any]) -> Chosen:
-    """Return a copy of the section with other values at dotted paths.
+    """Return a copy of the section with other values at dotted paths, ``legs.0.increments``.
 
     The values are not validated: the caller makes sure that they fit together.
     """
     for path, value in values.items():
         name, _, below = path.partition(".")
-        inner = changed(getattr(section, name), {below: value}) if below else value
+        inner = getattr(section, name)
+        if below and isinstance(inner, tuple):
+            number, _, below = below.partition(".")
+            place = int(number)
+            inner = (*inner[:place], changed(inner[place], {below: value}), *inner[place + 1 :])
+        else:
+            inner = changed(inner, {below: value}) if below else value
         section = section.model_copy(update={name: inner})
     return section

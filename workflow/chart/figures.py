@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from math import inf, isfinite, log10
 from pathlib import Path
@@ -10,9 +10,9 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
+from matplotlib.transforms import Bbox
 
-from workflow.chart.ladder import ROUNDING, Judged, Ladder
-from workflow.chart.names import Place, name_marks
+from workflow.chart.ladder import ROUNDING, Ladder, Point
 from workflow.chart.run import Chart
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, write_figures
@@ -35,6 +35,20 @@ DEEPEST = 1e-3
 SMALLEST = 1e-12
 # Room for the name of the most expensive rung, relative to the width of the plot.
 LAST_NAME = 0.25
+NAME_SIZE = 9
+# Offsets [points] and alignment of a name from its mark; the first free one is used.
+OFFSETS: tuple[tuple[int, int, str], ...] = (
+    (10, 6, "left"),
+    (10, -14, "left"),
+    (-10, 6, "right"),
+    (-10, -14, "right"),
+    (12, -4, "left"),
+    (-12, -4, "right"),
+)
+# Half the width of a mark [pixels].
+HALF_MARK = 5.0
+
+Place = tuple[float, float]
 
 
 def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
@@ -58,12 +72,12 @@ def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
     bottom = _bottom([ladder])
     panels = _panels(figure, [ladder])
     for axis, cost in panels:
-        branches = list(dict.fromkeys(rung.point.rung.branch for rung in ladder.rungs))
+        branches = list(dict.fromkeys(rung.setting.branch for rung in ladder.rungs))
         for number, branch in enumerate(branches):
-            rungs = [rung for rung in ladder.rungs if rung.point.rung.branch == branch]
+            rungs = [rung for rung in ladder.rungs if rung.setting.branch == branch]
             label = branch if len(branches) > 1 else ""
             _draw_line(axis, rungs, cost, bottom, number, label or None)
-        _draw_baseline(axis, [rung for rung in ladder.rungs if rung.point.baseline], cost, bottom)
+        _draw_baseline(axis, ladder, cost, bottom)
         _draw_frontier(axis, ladder.rungs, cost, bottom)
         _draw_floor(axis, ladder)
         if len(branches) == 1 and 1 < len(ladder.references) <= MOST_QUANTITIES:
@@ -73,7 +87,7 @@ def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
     figure.draw_without_rendering()
     for axis, cost in panels:
         marks = [_place(rung, cost, bottom) for rung in ladder.rungs]
-        name_marks(axis, _names(ladder.rungs, cost, bottom), marks)
+        _name_marks(axis, _names(ladder.rungs, cost, bottom), marks)
     return figure
 
 
@@ -85,10 +99,10 @@ def all_figure(chart: Chart) -> Figure:
     figure = new_figure(title, HEIGHT)
     for axis, cost in _panels(figure, ladders):
         for number, ladder in enumerate(ladders):
-            baseline = [rung for rung in ladder.rungs if rung.point.baseline]
+            baseline = [ladder.baseline] if ladder.baseline else []
             _draw_line(axis, baseline, cost, lowest, number, None)
             _draw_line(axis, _frontier(ladder.rungs, cost), cost, lowest, number, ladder.axis.name)
-            _draw_baseline(axis, baseline, cost, lowest)
+            _draw_baseline(axis, ladder, cost, lowest)
         axis.axhline(lowest, color=BLACK, lw=0.6, ls=":")
         _finish(axis, cost, chart.accuracy, (lowest, _top(ladders, chart.accuracy)))
     _label(figure)
@@ -101,7 +115,7 @@ def all_figure(chart: Chart) -> Figure:
 def _panels(figure: Figure, ladders: Sequence[Ladder]) -> list[tuple[Axes, str]]:
     """Return axes for each cost that is known for the runs."""
     rungs = [rung for ladder in ladders for rung in ladder.rungs]
-    known = [cost for cost in COSTS if any(getattr(rung.point.cost, cost) for rung in rungs)]
+    known = [cost for cost in COSTS if any(getattr(rung.cost, cost) for rung in rungs)]
     axes = figure.subplots(1, len(known), sharey=True, squeeze=False)
     return list(zip(axes[0], known, strict=True))
 
@@ -119,14 +133,14 @@ def _top(ladders: Sequence[Ladder], accuracy: float) -> float:
     return MARGIN * max([accuracy, *errors])
 
 
-def _place(rung: Judged, cost: str, bottom: float) -> Place:
+def _place(rung: Point, cost: str, bottom: float) -> Place:
     """Return cost and error of a rung in the figure."""
-    spent = float(getattr(rung.point.cost, cost))
-    return max(spent, 1e-2), max(rung.error, bottom)
+    size = float(getattr(rung.cost, cost))
+    return max(size, 1e-2), max(rung.error, bottom)
 
 
 def _draw_line(
-    axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float, number: int, label: str | None
+    axis: Axes, rungs: Sequence[Point], cost: str, bottom: float, number: int, label: str | None
 ) -> None:
     """Draw a branch, with full marks for resolved rungs and hollow marks for others."""
     if not rungs:
@@ -136,7 +150,7 @@ def _draw_line(
     joined = [
         place
         for rung, place in zip(rungs, places, strict=True)
-        if rung.error > 0.0 and rung.point.rung.step is not None
+        if rung.error > 0.0 and rung.setting.step is not None
     ]
     if joined:
         axis.plot(*zip(*joined, strict=True), "-", color=colour, alpha=0.6, lw=1.2)
@@ -149,44 +163,45 @@ def _draw_line(
         axis.plot([], [], f"-{marker}", color=colour, ms=8, label=label)
 
 
-def _names(rungs: Sequence[Judged], cost: str, bottom: float) -> list[tuple[str, Place]]:
+def _names(rungs: Sequence[Point], cost: str, bottom: float) -> list[tuple[str, Place]]:
     """Return names of marks and their places, first the case's own, then the efficient ones.
 
     Marks at the same place share one name.
     """
     frontier = _frontier(rungs, cost)
-    first = sorted(rungs, key=lambda rung: (not rung.point.baseline, rung not in frontier))
-    together: dict[Place, list[Judged]] = {}
+    first = sorted(rungs, key=lambda rung: (not rung.baseline, rung not in frontier))
+    together: dict[Place, list[Point]] = {}
     for rung in first:
         x, y = _place(rung, cost, bottom)
         together.setdefault((round(log10(x), PLACE), round(log10(y), PLACE)), []).append(rung)
     named = []
     for group in together.values():
-        names = [rung.name.removeprefix(f"{rung.point.rung.branch}, ") for rung in group]
+        names = [rung.name.removeprefix(f"{rung.setting.branch}, ") for rung in group]
         named.append((" and ".join(names), _place(group[0], cost, bottom)))
     return named
 
 
-def _draw_baseline(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
-    for rung in rungs:
-        place = _place(rung, cost, bottom)
+def _draw_baseline(axis: Axes, ladder: Ladder, cost: str, bottom: float) -> None:
+    """Circle the case as written."""
+    if ladder.baseline is not None:
+        place = _place(ladder.baseline, cost, bottom)
         axis.plot(*place, "o", mfc="none", mec=BLACK, mew=1.6, ms=17, zorder=4)
     axis.plot([], [], "o", mfc="none", mec=BLACK, mew=1.6, ms=13, label="the case as written")
 
 
-def _frontier(rungs: Sequence[Judged], cost: str) -> list[Judged]:
+def _frontier(rungs: Sequence[Point], cost: str) -> list[Point]:
     """Return the efficient rungs, the cheapest first."""
     efficient = [rung for rung in rungs if getattr(rung, f"by_{cost}")]
     return sorted(efficient, key=lambda rung: rung.bound, reverse=True)
 
 
-def _draw_frontier(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
+def _draw_frontier(axis: Axes, rungs: Sequence[Point], cost: str, bottom: float) -> None:
     """Draw the efficient frontier as steps: the smallest error for no more than a given cost."""
     places = [_place(rung, cost, bottom) for rung in _frontier(rungs, cost)]
     if places:
-        spent, errors = zip(*places, strict=True)
+        costs, errors = zip(*places, strict=True)
         grey = "#88888859"
-        axis.step(spent, errors, where="post", label="efficient", color=grey, lw=5.0, zorder=1)
+        axis.step(costs, errors, where="post", label="efficient", color=grey, lw=5.0, zorder=1)
 
 
 def _draw_floor(axis: Axes, ladder: Ladder) -> None:
@@ -200,7 +215,7 @@ def _draw_quantities(axis: Axes, ladder: Ladder, cost: str) -> None:
     """Draw the error of each quantity where it is resolved; its slope shows the order."""
     for number, (quantity, reference) in enumerate(ladder.references.items(), 1):
         places = [
-            (_place(rung, cost, 0.0)[0], abs(rung.point.values[quantity] / reference.value - 1.0))
+            (_place(rung, cost, 0.0)[0], abs(rung.values[quantity] / reference.value - 1.0))
             for rung in ladder.rungs
         ]
         seen = [place for place in places if place[1] > reference.floor]
@@ -226,3 +241,41 @@ def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -
 def _label(figure: Figure) -> None:
     figure.axes[0].set_ylabel("largest relative error of the quantities")
     legend_below(figure, figure.axes[:1], columns=LEGEND_COLUMNS, fontsize=LEGEND_SIZE)
+
+
+# --- names --------------------------------------------------------------------------------------
+
+
+def _name_marks(axis: Axes, names: Iterable[tuple[str, Place]], marks: Sequence[Place]) -> None:
+    """Write each name next to its place, clear of all ``marks`` and of earlier names.
+
+    Names without room are left out, so the most important ones must come first. The layout of the
+    figure must be computed before.
+    """
+    taken = [_box(axis, place) for place in marks]
+    for name, place in names:
+        for across, up, side in OFFSETS:
+            text = axis.annotate(
+                name,
+                place,
+                (across, up),
+                textcoords="offset points",
+                fontsize=NAME_SIZE,
+                ha=side,
+            )
+            text.set_in_layout(False)
+            box = text.get_window_extent()
+            if _inside(box, axis.bbox) and not any(box.overlaps(other) for other in taken):
+                taken.append(box)
+                break
+            text.remove()
+
+
+def _box(axis: Axes, place: Place) -> Bbox:
+    """Return the box of a mark [pixels]."""
+    x, y = axis.transData.transform(place)
+    return Bbox.from_extents(x - HALF_MARK, y - HALF_MARK, x + HALF_MARK, y + HALF_MARK)
+
+
+def _inside(box: Bbox, room: Bbox) -> bool:
+    return bool(box.x0 >= room.x0 and box.x1 <= room.x1 and box.y0 >= room.y0 and box.y1 <= room.y1)

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, nan
 
-from workflow.chart.axes import Axis, Rung
+from workflow.analyses.wear.approximations.approximation import Approximation, Rung
+from workflow.analyses.wear.approximations.convergence import Convergence, richardson
 from workflow.chart.costs import Cost
 from workflow.chart.frontier import Option, efficient
-from workflow.shell.convergence import Convergence, richardson
 
 # Relative changes of a quantity below this are rounding, and say nothing about convergence.
 ROUNDING = 1e-12
@@ -21,18 +21,32 @@ SHORTEST = 1e-2
 
 @dataclass(frozen=True)
 class Point:
-    """Rung that has run.
+    """Setting of a ladder that has run, with its errors relative to the references.
 
     ``values`` are by quantity; ``extras`` are only reported. ``baseline`` marks the settings of the
-    case itself.
+    case itself. ``error`` is the largest relative difference, that of the quantity ``worst``;
+    ``bound`` adds the floor of the reference. ``unresolved`` means that the error is smaller than
+    the uncertainty of the references. ``seconds`` is the cost that decides: see
+    :func:`seconds_by_work`.
     """
 
-    rung: Rung
+    setting: Rung
     baseline: bool
     folder: str
     values: Mapping[str, float]
     cost: Cost
     extras: Mapping[str, float] = field(default_factory=dict)
+    error: float = inf
+    worst: str = ""
+    bound: float = inf
+    seconds: float = inf
+    unresolved: bool = False
+    by_seconds: bool = False
+    by_convolutions: bool = False
+
+    @property
+    def name(self) -> str:
+        return self.setting.name
 
 
 @dataclass(frozen=True)
@@ -48,36 +62,17 @@ class Reference:
     order: float | None
     floor: float
 
-
-@dataclass(frozen=True)
-class Judged:
-    """Rung with its errors relative to the references.
-
-    ``error`` is its largest relative difference, that of the quantity ``worst``; ``bound`` adds the
-    floor of the reference. ``unresolved`` means that the error is smaller than the uncertainty of
-    the references. ``seconds`` is the cost that decides: see :func:`seconds_by_work`.
-    """
-
-    point: Point
-    error: float
-    worst: str
-    bound: float
-    seconds: float
-    unresolved: bool
-    by_seconds: bool
-    by_convolutions: bool
-
-    @property
-    def name(self) -> str:
-        return self.point.rung.name
+    def error(self, value: float) -> float:
+        """Return the relative difference of a value from the reference."""
+        return abs(value - self.value) / abs(self.value)
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """Axis with all of its runs; ``failed`` has an error message for each run that failed."""
+    """Approximation with all of its runs; ``failed`` has a message for each that failed."""
 
-    axis: Axis
-    rungs: tuple[Judged, ...]
+    axis: Approximation
+    rungs: tuple[Point, ...]
     references: Mapping[str, Reference]
     failed: Mapping[str, str]
 
@@ -87,27 +82,27 @@ class Ladder:
         return max((reference.floor for reference in self.references.values()), default=nan)
 
     @property
-    def baseline(self) -> Judged | None:
+    def baseline(self) -> Point | None:
         """Rung with the settings of the case itself, or None if it did not run."""
-        return next((rung for rung in self.rungs if rung.point.baseline), None)
+        return next((rung for rung in self.rungs if rung.baseline), None)
 
     @property
     def scatter(self) -> float:
         """Relative scatter of the times: by how much they contradict the order of the work."""
-        excess = [rung.point.cost.seconds / rung.seconds - 1.0 for rung in self.rungs]
+        excess = [rung.cost.seconds / rung.seconds - 1.0 for rung in self.rungs]
         return max([TIMING, *excess])
 
-    def cheapest(self, accuracy: float) -> Judged | None:
+    def cheapest(self, accuracy: float) -> Point | None:
         """Return the rung of least cost whose error is certainly at most ``accuracy``.
 
         On a branch this is the coarsest such rung, whatever the measured times are. Branches are
         compared by seconds, and by convolutions where their seconds differ within the scatter.
         """
         met = [rung for rung in self.rungs if rung.bound <= accuracy]
-        met = [rung for rung in met if not any(_finer(rung.point, other.point) for other in met)]
+        met = [rung for rung in met if not any(_finer(rung, other) for other in met)]
         least = min((rung.seconds for rung in met), default=0.0)
         quick = [rung for rung in met if rung.seconds <= (1.0 + self.scatter) * least]
-        return min(quick, key=lambda rung: rung.point.cost.convolutions, default=None)
+        return min(quick, key=lambda rung: rung.cost.convolutions, default=None)
 
     def options(self) -> list[Option]:
         """Return the rungs as choices, with costs relative to that of the case's own settings."""
@@ -132,14 +127,14 @@ def seconds_by_work(points: Sequence[Point]) -> list[float]:
 
 def _finer(one: Point, other: Point) -> bool:
     """Return whether ``one`` is a finer rung of the branch of ``other``."""
-    step, coarser = one.rung.step, other.rung.step
-    if one.rung.branch != other.rung.branch or step is None or coarser is None:
+    step, coarser = one.setting.step, other.setting.step
+    if one.setting.branch != other.setting.branch or step is None or coarser is None:
         return False
     return step < coarser
 
 
 def judge(
-    axis: Axis,
+    axis: Approximation,
     points: Sequence[Point],
     exact: Mapping[str, float],
     failed: Mapping[str, str],
@@ -152,57 +147,47 @@ def judge(
     Quantities in ``exact`` are compared with those values instead, where the axis converges to
     them. Quantities that are 0 in the reference, or that a point does not have, are left out.
     """
-    shared = [q for q in points[-1].values if all(q in point.values for point in points)]
+    last = points[-1]
+    shared = [q for q in last.values if all(q in point.values for point in points)]
     references = {q: _reference(axis, points, q, exact) for q in shared}
-    if axis.order is None and finest not in ("", points[-1].rung.name):
+    if axis.order is None and finest not in ("", last.setting.name):
         references = {q: replace(reference, floor=inf) for q, reference in references.items()}
     references = {q: reference for q, reference in references.items() if reference.value}
-    errors = [_errors(point, references) for point in points]
-    seconds = seconds_by_work(points)
-    convolutions = [float(point.cost.convolutions) for point in points]
-    bounds = [
-        max((e + references[q].floor for q, e in relative.items()), default=inf)
-        for relative in errors
-    ]
-    flags = zip(efficient(seconds, bounds), efficient(convolutions, bounds), strict=True)
     floor = max((reference.floor for reference in references.values()), default=0.0)
     judged = []
-    rows = zip(points, errors, bounds, seconds, flags, strict=True)
-    for point, relative, bound, spent, (quick, few) in rows:
-        worst = max(relative, key=lambda q: relative[q], default="")
-        error = relative.get(worst, inf)
-        worst = worst if error > 0.0 else ""
-        judged.append(Judged(point, error, worst, bound, spent, error < floor, quick, few))
-    return Ladder(axis, tuple(judged), references, failed)
+    for point, seconds in zip(points, seconds_by_work(points), strict=True):
+        errors = {q: reference.error(point.values[q]) for q, reference in references.items()}
+        worst = max(errors, key=errors.__getitem__, default="")
+        error = errors.get(worst, inf)
+        bound = max((e + references[q].floor for q, e in errors.items()), default=inf)
+        point = replace(point, error=error, bound=bound, unresolved=error < floor)
+        judged.append(replace(point, seconds=seconds, worst=worst if error > 0.0 else ""))
+    bounds = [point.bound for point in judged]
+    by_seconds = efficient([point.seconds for point in judged], bounds)
+    by_convolutions = efficient([float(point.cost.convolutions) for point in judged], bounds)
+    flags = zip(judged, by_seconds, by_convolutions, strict=True)
+    rungs = [replace(p, by_seconds=quick, by_convolutions=few) for p, quick, few in flags]
+    return Ladder(axis, tuple(rungs), references, failed)
 
 
 def _reference(
-    axis: Axis, points: Sequence[Point], quantity: str, exact: Mapping[str, float]
+    axis: Approximation, points: Sequence[Point], quantity: str, exact: Mapping[str, float]
 ) -> Reference:
+    """Return the closed form, or the value of the last point with its error on its branch.
+
+    A branch without steps is a choice.
+    """
     last = points[-1]
-    value = last.values[quantity]
-    convergence = _convergence(axis, points, quantity)
+    value, convergence = last.values[quantity], Convergence(None, 0.0)
+    branch = {
+        step: point.values[quantity]
+        for point in points
+        if point.setting.branch == last.setting.branch and (step := point.setting.step) is not None
+    }
+    if axis.order is not None and branch:
+        noise = ROUNDING * abs(value)
+        convergence = richardson([*branch.values()], [*branch], axis.order, noise)
     if axis.closed_form and quantity in exact:
         return Reference(exact[quantity], True, convergence.order, 0.0)
-    return Reference(
-        value, False, convergence.order, convergence.error / abs(value) if value else 0.0
-    )
-
-
-def _convergence(axis: Axis, points: Sequence[Point], quantity: str) -> Convergence:
-    """Return the convergence on the branch of the last point; one without steps is a choice."""
-    last = points[-1]
-    branch = [p for p in points if p.rung.branch == last.rung.branch and p.rung.step is not None]
-    if axis.order is None or not branch:
-        return Convergence(None, 0.0)
-    values = [point.values[quantity] for point in branch]
-    steps = [float(point.rung.step or nan) for point in branch]
-    return richardson(values, steps, axis.order, ROUNDING * abs(last.values[quantity]))
-
-
-def _errors(point: Point, references: Mapping[str, Reference]) -> dict[str, float]:
-    """Return the relative difference of each quantity from its reference."""
-    return {
-        quantity: abs(point.values[quantity] - reference.value) / abs(reference.value)
-        for quantity, reference in references.items()
-    }
+    floor = convergence.error / abs(value) if value else 0.0
+    return Reference(value, False, convergence.order, floor)

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from workflow.chart.frontier import Combination, cheapest
-from workflow.chart.ladder import Judged, Ladder
+from workflow.chart.ladder import Ladder, Point
 from workflow.chart.run import KIND, Chart
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.versions import versions
@@ -60,12 +60,12 @@ def _choice(ladder: Ladder, accuracy: float) -> str:
     )
 
 
-def _costs(rung: Judged) -> str:
-    cost = rung.point.cost
+def _costs(rung: Point) -> str:
+    cost = rung.cost
     return f"{cost.seconds:.3g} s, {cost.convolutions} convolutions"
 
 
-def _error(ladder: Ladder, rung: Judged) -> str:
+def _error(ladder: Ladder, rung: Point) -> str:
     """Return the error of a rung in words, with its uncertainty."""
     if rung.error == 0.0:
         known = f"known to {percent(ladder.floor)}" if ladder.floor else "by definition"
@@ -123,7 +123,7 @@ def _table(ladder: Ladder) -> Table:
     title = f"{ladder.axis.name}: {ladder.axis.what}{_reference(ladder)}"
     table = Table(Column("", no_wrap=True), *columns, "worst", "", title=title, box=SIMPLE)
     for rung in ladder.rungs:
-        cost, marks = rung.point.cost, _marks(rung)
+        cost, marks = rung.cost, _marks(rung)
         error = "reference" if rung.error == 0.0 else percent(rung.error)
         numbers = f"{cost.seconds:.2f}", str(cost.convolutions), str(cost.solves)
         table.add_row(rung.name, error, *numbers, rung.worst, ", ".join(marks))
@@ -142,9 +142,9 @@ def _reference(ladder: Ladder) -> str:
     return f" (references known to {percent(ladder.floor)}{observed})"
 
 
-def _marks(rung: Judged) -> list[str]:
+def _marks(rung: Point) -> list[str]:
     marks = {
-        "as written": rung.point.baseline,
+        "as written": rung.baseline,
         "efficient": rung.by_seconds,
         "unresolved": rung.unresolved and rung.error > 0.0,
     }
@@ -159,16 +159,16 @@ def _write_table(chart: Chart, path: Path) -> None:
     write_table(path, {name: [row.get(name) for row in rows] for name in names})
 
 
-def _cells(ladder: Ladder, rung: Judged) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+def _cells(ladder: Ladder, rung: Point) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """Return the cells of a rung: its settings, its quantities, and its errors and costs."""
-    point, cost = rung.point, rung.point.cost
+    cost = rung.cost
     head = {
         "axis": ladder.axis.name,
-        "branch": point.rung.branch,
+        "branch": rung.setting.branch,
         "rung": rung.name,
-        "settings": " ".join(point.rung.overrides),
-        "own": point.baseline,
-        "folder": point.folder,
+        "settings": " ".join(rung.setting.overrides),
+        "own": rung.baseline,
+        "folder": rung.folder,
     }
     tail = {
         "error": rung.error,
@@ -182,7 +182,7 @@ def _cells(ladder: Ladder, rung: Judged) -> tuple[dict[str, Any], dict[str, Any]
         "efficient_by_seconds": rung.by_seconds,
         "efficient_by_convolutions": rung.by_convolutions,
     }
-    return head, {**point.values, **point.extras}, tail
+    return head, {**rung.values, **rung.extras}, tail
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -215,22 +215,21 @@ def _axis_summary(ladder: Ladder, chart: Chart) -> dict[str, Any]:
     }
 
 
-def _rung_summary(rung: Judged) -> dict[str, Any]:
-    point = rung.point
+def _rung_summary(rung: Point) -> dict[str, Any]:
     return {
         "name": rung.name,
-        "branch": point.rung.branch,
-        "settings": list(point.rung.overrides),
-        "own": point.baseline,
-        "folder": f"runs/{point.folder}",
-        "values": dict(point.values),
-        "extras": dict(point.extras),
+        "branch": rung.setting.branch,
+        "settings": list(rung.setting.overrides),
+        "own": rung.baseline,
+        "folder": f"runs/{rung.folder}",
+        "values": dict(rung.values),
+        "extras": dict(rung.extras),
         "error": _finite(rung.error),
         "worst": rung.worst,
         "bound": _finite(rung.bound),
         "unresolved": rung.unresolved,
         "efficient": {"seconds": rung.by_seconds, "convolutions": rung.by_convolutions},
-        "cost": vars(point.cost),
+        "cost": vars(rung.cost),
     }
 
 

@@ -7,10 +7,9 @@ reused and interrupted ones resumed.
 
 from __future__ import annotations
 
-import json
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import chain
@@ -19,10 +18,16 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from workflow.analyses.wear.approximations.approximation import (
+    Approximation,
+    Rung,
+    entry_at,
+    overrides_of,
+)
 from workflow.case.changing import changed
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case
-from workflow.chart.axes import Axis, Setting, axes_of, entry_at
+from workflow.chart.axes import Setting, axes_of
 from workflow.chart.costs import Cost, costs
 from workflow.chart.ladder import Ladder, Point, judge
 from workflow.errors import MethodFailed, UserError
@@ -66,8 +71,7 @@ class Chart:
 class _Run:
     """Finished run of a setting; ``summary`` includes the middle sections of wear."""
 
-    case: Case
-    finished: Finished
+    folder: Path
     summary: Mapping[str, Any]
     cost: Cost
 
@@ -98,10 +102,10 @@ def chart_case(
     :class:`UserError` if an axis does not apply or a quantity does not exist.
     """
     base = (*overrides, *_plain(load_case(case, overrides), quantities))
-    settings = axes_of(case, base, axes)
+    written, settings = load_case(case, base), axes_of(case, base, axes)
     jobs = _jobs(case, base, settings)
     folder = OutputFolder(out, KIND)
-    _claim(folder, load_case(case, base))
+    _claim(folder, written)
     log = folder.reserve(LOG, "what it said, and when")
     with (
         environment({CACHE: str((out / STRUCTURES).absolute())}),
@@ -112,13 +116,12 @@ def chart_case(
     runs = _runs(ended)
     if not runs:
         raise MethodFailed(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
-    first = runs.get(BASELINE) or next(iter(runs.values()))
     failed = {end.job.name: end.error for end in ended if end.summary is None}
-    ladders = [
-        _ladder(axis, rungs, jobs, runs, left_out | failed, quantities)
-        for axis, rungs in settings.items()
-    ]
-    return Chart(first.case.title, tuple(ladders), accuracy, complete=not failed)
+    ladders = []
+    for axis, of_axis in settings.items():
+        rungs = [(setting.rung, jobs[setting.text].name) for setting in of_axis]
+        ladders.append(_ladder(axis, rungs, runs, left_out | failed, written, quantities))
+    return Chart(written.title, tuple(ladders), accuracy, complete=not failed)
 
 
 def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
@@ -132,8 +135,8 @@ def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
         case = changed(case, {"fidelity": "fixed"})
     # Open settings are chosen once, for the case as written, and fixed on all rungs.
     _, record = analysis_of(case).choose(case)
-    for entry, value in (record or {"chosen": {}})["chosen"].items():
-        yield f"{entry}={json.dumps(value)}"
+    if record is not None:
+        yield from overrides_of(record["chosen"])
 
 
 def _claim(folder: OutputFolder, case: Case) -> None:
@@ -147,7 +150,7 @@ def _claim(folder: OutputFolder, case: Case) -> None:
 
 
 def _jobs(
-    case: Path, base: Sequence[str], settings: Mapping[Axis, list[Setting]]
+    case: Path, base: Sequence[str], settings: Mapping[Approximation, list[Setting]]
 ) -> dict[str, Job]:
     """Return a job for each different case, by its text; the case's own settings come first."""
     baseline = Setting.of(case, base)
@@ -163,7 +166,7 @@ def _jobs(
 
 def _run(
     jobs: Mapping[str, Job],
-    settings: Mapping[Axis, list[Setting]],
+    settings: Mapping[Approximation, list[Setting]],
     out: Path,
     quantities: Sequence[str],
     reporter: Reporter,
@@ -180,8 +183,9 @@ def _run(
     left_out = {}
     for setting in chain.from_iterable(settings.values()):
         if why := _too_long(setting, ended[0].summary or {}):
-            left_out[jobs[setting.text].name] = why
-    progress.leave_out(left_out)
+            name = jobs[setting.text].name
+            left_out[name] = why
+            progress.times.pop(name, None)
     others = [job for job in others if job.name not in left_out]
     ended += run_jobs(others, out, alone=True, report=progress, running=progress.running)
     return ended, left_out
@@ -201,19 +205,14 @@ def _too_long(setting: Setting, summary: Mapping[str, Any]) -> str:
 class _Progress:
     """Reporter of each run as it ends, and of the remaining time.
 
-    Runs are weighted by their time estimates, because the time grows from rung to rung.
+    Runs are weighted by the estimates of their ``times``, which grow from rung to rung.
     """
 
     def __init__(self, jobs: Mapping[str, Job], reporter: Reporter) -> None:
         self._reporter, self._spent, self._ended = reporter, 0.0, 0
         self._total, self._last = len(jobs), time.perf_counter()
         cases = {job.name: job.load() for job in jobs.values()}
-        self._times = {n: analysis_of(case).run_time(case).seconds for n, case in cases.items()}
-
-    def leave_out(self, names: Iterable[str]) -> None:
-        """Remove runs that will not take place."""
-        for name in names:
-            self._times.pop(name, None)
+        self.times = {n: analysis_of(case).run_time(case).seconds for n, case in cases.items()}
 
     def running(self, names: Sequence[str]) -> None:
         """Report the names of the runs in progress."""
@@ -225,12 +224,12 @@ class _Progress:
             own = sum(finished.summary.get("seconds", {}).values())
             ending = f"{own:.1f} s"
         name, now = finished.job.name, time.perf_counter()
-        self._spent += self._times[name]
+        self._spent += self.times[name]
         self._ended += 1
-        told = f"{self._ended}/{self._total} {name}: {ending}"
-        self._reporter.say(told, always=finished.summary is None)
+        line = f"{self._ended}/{self._total} {name}: {ending}"
+        self._reporter.say(line, always=finished.summary is None)
         at = f"{self._ended} of {self._total}"
-        self._reporter.reached(self._spent / sum(self._times.values()), at)
+        self._reporter.reached(self._spent / sum(self.times.values()), at)
         if now - self._last < KEPT * own:
             self._reporter.goes_on()
         self._last = now
@@ -238,13 +237,12 @@ class _Progress:
 
 def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:
     """Return the finished runs, by the name of the job."""
-    completed = [(finished, finished.summary) for finished in ended if finished.summary is not None]
-    cases = [finished.job.load() for finished, _ in completed]
-    folders = [finished.folder for finished, _ in completed]
-    paid = costs(cases, folders, [summary for _, summary in completed])
+    completed = [(end, end.job.load(), end.summary) for end in ended if end.summary is not None]
+    cases, folders = [case for _, case, _ in completed], [end.folder for end, _, _ in completed]
+    paid = costs(cases, folders, [summary for *_, summary in completed])
     return {
-        finished.job.name: _Run(case, finished, _measured(case, finished.folder, summary), cost)
-        for (finished, summary), case, cost in zip(completed, cases, paid, strict=True)
+        end.job.name: _Run(end.folder, _measured(case, end.folder, summary), cost)
+        for (end, case, summary), cost in zip(completed, paid, strict=True)
     }
 
 
@@ -264,58 +262,47 @@ def _check(quantities: Sequence[str], summary: Mapping[str, Any]) -> None:
 
 
 def _ladder(
-    axis: Axis,
-    settings: Sequence[Setting],
-    jobs: Mapping[str, Job],
+    axis: Approximation,
+    rungs: Sequence[tuple[Rung, str]],
     runs: Mapping[str, _Run],
     errors: Mapping[str, str],
+    case: Case,
     picked: Sequence[str],
 ) -> Ladder:
-    """Return the ladder of an axis, with its finished and its failed rungs."""
-    rungs = [(setting.rung, jobs[setting.text].name) for setting in settings]
-    completed = [(rung, runs[name]) for rung, name in rungs if name in runs]
+    """Return the ladder of an axis, with its finished and its failed rungs, by names of runs."""
     failed = {rung.name: errors[name] for rung, name in rungs if name in errors}
+    completed = [(rung, name) for rung, name in rungs if name in runs]
     if not completed:
         return Ladder(axis, (), {}, failed)
-    last = completed[-1][1]
-    wanted = _quantities(axis, runs.get(BASELINE, last), picked)
-    exact = {entry.quantity: entry.value for entry in last.case.expect if entry.exact}
-    points = [
-        Point(
-            rung=rung,
-            baseline=run.finished.job.name == BASELINE,
-            folder=run.finished.job.name,
-            values=_numbers(run.summary, wanted),
-            cost=run.cost,
-            extras=_extras(run, last),
-        )
-        for rung, run in completed
-    ]
+    last, comparison = runs[completed[-1][1]], analysis_of(case).comparison
+    wanted = _quantities(axis, case, runs.get(BASELINE, last).summary, picked)
+    points = []
+    for rung, name in completed:
+        run = runs[name]
+        extras = _numbers(run.summary, comparison.extras(run.summary))
+        extras |= comparison.apart(run.folder, last.folder, run.summary)
+        values = _numbers(run.summary, wanted)
+        points.append(Point(rung, name == BASELINE, name, values, run.cost, extras))
+    exact = {entry.quantity: entry.value for entry in case.expect if entry.exact}
     return judge(axis, points, exact, failed, finest=rungs[-1][0].name)
 
 
-def _quantities(axis: Axis, run: _Run, picked: Sequence[str]) -> list[str]:
+def _quantities(
+    axis: Approximation, case: Case, summary: Mapping[str, Any], picked: Sequence[str]
+) -> list[str]:
     """Return the quantities by which the rungs of an axis are compared."""
-    comparison = analysis_of(run.case).comparison
+    comparison = analysis_of(case).comparison
     if axis.sections:
-        return comparison.sections(run.summary)
-    paths = list(picked)
-    if not paths:
-        # A relative error of a quantity that is 0 is not defined.
-        by_default = comparison.quantities(run.case, run.summary)
-        paths = [path for path in by_default if number_at(run.summary, path)]
+        return comparison.sections(summary)
+    # A relative error of a quantity that is 0 is not defined.
+    by_default = [p for p in comparison.quantities(case, summary) if number_at(summary, p)]
+    paths = list(picked) or by_default
     if axis.moves_states:
         paths = [p for p in paths if not FROM_THE_FIRST.match(p)] or list(comparison.at_the_end)
     return paths
 
 
 def _numbers(summary: Mapping[str, Any], paths: Sequence[str]) -> dict[str, float]:
+    """Return the numbers at the paths where there are any."""
     numbers = {path: number_at(summary, path) for path in paths}
     return {path: value for path, value in numbers.items() if value is not None}
-
-
-def _extras(run: _Run, last: _Run) -> dict[str, float]:
-    """Return further numbers of a run, and how far its fields are from those of the last run."""
-    comparison, folder = analysis_of(run.case).comparison, run.finished.folder
-    beside = _numbers(run.summary, comparison.extras(run.summary))
-    return beside | comparison.apart(folder, last.finished.folder, run.summary)

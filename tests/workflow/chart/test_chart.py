@@ -11,10 +11,12 @@ import pytest
 from sa_solver.types import Grid
 from tests.marks import slow
 from tests.workflow.output.figure_checks import problems
+from workflow.analyses.wear.approximations.approximation import Approximation, Rung
+from workflow.analyses.wear.approximations.convergence import richardson
 from workflow.analyses.wear.output.measures import profile_difference
 from workflow.case.text.writing import dump_case
 from workflow.chart import Chart, accuracy_of
-from workflow.chart.axes import AXES, Axis, Rung, axes_of
+from workflow.chart.axes import AXES, axes_of
 from workflow.chart.costs import Cost, costs, stage_seconds
 from workflow.chart.figures import axis_figure
 from workflow.chart.frontier import Option, cheapest, efficient
@@ -22,7 +24,6 @@ from workflow.chart.ladder import Ladder, Point, judge
 from workflow.chart.report import combination, sentences, write_chart
 from workflow.errors import UserError
 from workflow.kinds import load_case
-from workflow.shell.convergence import richardson
 from workflow.shell.output.summary import number_at
 
 # --- frontier -----------------------------------------------------------------------------------
@@ -119,7 +120,7 @@ GRID, METHOD = (next(axis for axis in AXES if axis.name == name) for name in ("g
 def point(name: str, step: float | None, values: dict[str, float], seconds: float) -> Point:
     """Return a rung that took ten convolutions per second; ``own`` is the case as written."""
     cost = Cost(seconds, round(10 * seconds), 1)
-    return Point(Rung(name, (f"a={name}",), step), name == "own", name, values, cost)
+    return Point(Rung(name, {"a": name}, step), name == "own", name, values, cost)
 
 
 def test_a_busy_machine_changes_no_choice():
@@ -184,7 +185,7 @@ def test_a_closed_form_is_the_reference_where_the_axis_goes_to_it():
 def test_the_bound_holds_against_the_true_limit():
     ladder = judge(GRID, second_order(), {}, {})
     for rung in ladder.rungs:
-        values = rung.point.values
+        values = rung.values
         true = max(abs(values["depth"] - 1.0) / 1.0, abs(values["volume"] - 2.0) / 2.0)
         assert rung.bound == pytest.approx(true, rel=0.15)
 
@@ -229,8 +230,8 @@ def test_sentences_say_when_nothing_is_enough():
 
 @pytest.mark.slow
 def test_files_of_a_chart(tmp_path: Path):
-    told = write_chart(charted(0.1), tmp_path)
-    assert told["figure"] == tmp_path / "figures/chart_all.png"
+    written = write_chart(charted(0.1), tmp_path)
+    assert written["figure"] == tmp_path / "figures/chart_all.png"
     lines = (tmp_path / "chart.csv").read_text("utf-8").splitlines()
     assert len(lines) == 6
     assert lines[0].startswith("axis,branch,rung,settings,own,folder,depth,volume,error")
@@ -370,7 +371,7 @@ def test_every_rung_of_every_case_is_another_case_and_finer(path: Path):
         _check_steps(axis, settings)
 
 
-def _check_steps(axis: Axis, settings: list) -> None:
+def _check_steps(axis: Approximation, settings: list) -> None:
     """Assert that the rungs of a branch go from coarse to fine."""
     branches: dict[str, list[float]] = {}
     for setting in settings:

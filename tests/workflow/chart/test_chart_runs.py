@@ -19,8 +19,9 @@ from click.testing import CliRunner, Result
 import workflow.chart.run
 from sa_solver.reference.hertz import HertzSphere
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
+from workflow.analyses.wear.approximations import ladders
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.chart import axes, chart_case
+from workflow.chart import chart_case
 from workflow.chart.ladder import Ladder
 from workflow.cli import cli
 from workflow.errors import UserError
@@ -233,7 +234,7 @@ def test_every_different_case_runs_once_and_the_own_one_first(
     assert list(ladders) == ["grid", "method", "stepper", "dimension"]
     for ladder in ladders.values():
         assert ladder.baseline is not None
-        assert ladder.baseline.point.folder == "own"
+        assert ladder.baseline.folder == "own"
     for job in runs.ran:
         case = job.load()
         assert isinstance(case, DovetailCase)
@@ -247,7 +248,7 @@ def test_increments_that_are_auto_are_chosen_once(
     auto = {"axes": ("increments", "mesh"), "overrides": ("load_path.increments=auto",)}
     runs, ladders = made_up(monkeypatch, small_path, tmp_path, **auto)
     own = runs.ran[0].load().load_path
-    meshes = [r.point.folder for r in ladders["mesh"].rungs]
+    meshes = [r.folder for r in ladders["mesh"].rungs]
     assert {job.load().load_path for job in runs.ran if job.name in meshes} == {own}
     counts = [job.load().load_path.increments for job in runs.ran]
     divided = {tuple(round(f * n) for n in own.increments) for f in (0.5, 1.0, 2.0)}
@@ -263,11 +264,11 @@ def test_quantities_of_wear_and_what_they_cost(
     # Nothing wears of body 2, so that nothing is relative to it.
     assert list(grid.references) == ["intrados.depth_1", "intrados.volume_1"]
     assert grid.references["intrados.depth_1"].order == pytest.approx(2.0, rel=1e-6)
-    seconds = [rung.point.cost.seconds for rung in grid.rungs]
+    seconds = [rung.cost.seconds for rung in grid.rungs]
     # All found the condensation of the first, and pay for it as if they had not.
     assert seconds == pytest.approx([8.0 + rung_cells / 10.0 for rung_cells in (16, 32, 64)])
-    assert [rung.point.cost.convolutions for rung in grid.rungs] == [16, 32, 64]
-    first = grid.rungs[0].point.extras
+    assert [rung.cost.convolutions for rung in grid.rungs] == [16, 32, 64]
+    first = grid.rungs[0].extras
     assert first["intrados.peak_pressure.worn"] == 100.0
     assert first["depth anywhere"] == pytest.approx(grid.rungs[0].error)
     assert ladders["method"].failed == {"full": "made up to fail"}
@@ -282,10 +283,10 @@ def test_dimensions_are_compared_in_the_middle(
 ):
     _, ladders = made_up(monkeypatch, small_path, tmp_path, axes=("dimension",))
     two, three = ladders["dimension"].rungs
-    assert set(two.point.values) == {"middle.intrados.depth_1", "middle.intrados.area_1"}
+    assert set(two.values) == {"middle.intrados.depth_1", "middle.intrados.area_1"}
     assert two.error == pytest.approx(0.05)
     assert three.error == 0.0
-    assert "depth anywhere" not in two.point.extras
+    assert "depth anywhere" not in two.extras
 
 
 @pytest.mark.slow
@@ -320,9 +321,9 @@ def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     longer = ROLLER_WEAR.replace("  cycles: 4e4", "  cycles: 1e5")
     (tmp_path / "line.yaml").write_text(longer, encoding="utf-8")
     (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
-    monkeypatch.setattr(axes, "JUMPS", (5, 10, 20))
-    monkeypatch.setattr(axes, "ERRORS", ())
-    monkeypatch.setattr(axes, "EXPLICIT", ())
+    monkeypatch.setattr(ladders, "JUMPS", (5, 10, 20))
+    monkeypatch.setattr(ladders, "ERRORS", ())
+    monkeypatch.setattr(ladders, "EXPLICIT", ())
     run = in_process(lambda job, folder: run_case(job.load(), folder, force=True))
     monkeypatch.setattr(workflow.chart.run, "run_jobs", run)
     charted = chart_case(tmp_path / "line.yaml", tmp_path / "out", axes=("stepper",))
@@ -333,8 +334,8 @@ def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         # Forward and backward over different increments: see wear.steps.implicit.
         assert 0.8 < np.log2(coarse / fine) < 2.0
     assert errors["second order, 10 jumps"] < 0.1 * errors["implicit, 10 jumps"]
-    assert [rung.name for rung in ladder.rungs if rung.point.baseline] == ["implicit, 10 jumps"]
-    assert all(rung.point.cost.solves > 0 for rung in ladder.rungs)
+    assert [rung.name for rung in ladder.rungs if rung.baseline] == ["implicit, 10 jumps"]
+    assert all(rung.cost.solves > 0 for rung in ladder.rungs)
 
 
 @pytest.mark.slow

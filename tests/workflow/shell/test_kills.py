@@ -94,7 +94,7 @@ RUNS = {
     "half-space wear": LongRun(
         WEARING_RIG, ("forces=[40 N]", "frequencies=[100 Hz, 250 Hz]"), (("wear.yaml", BALL),)
     ),
-    # Short lives beside it are of runs in processes alone: those of the tests go without.
+    # Probe runs are computed in a worker process, which runs in tests do without.
     "wear": LongRun(
         BALL,
         (

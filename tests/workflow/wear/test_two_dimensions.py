@@ -19,7 +19,7 @@ from tests.workflow.output.shown_files import check_arrays, check_scene
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.checks.uniformity import ALIKE, Uniformity, sections, uniformities
 from workflow.analyses.wear.fidelity import choosing
-from workflow.analyses.wear.fidelity.dimension import choose_dimension
+from workflow.analyses.wear.fidelity.decisions import choose_dimension
 from workflow.analyses.wear.figures.wear import figures_of
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import face_contact
@@ -298,7 +298,7 @@ def test_sentence_of_a_uniform_slot():
 @pytest.fixture
 def dimension_only(monkeypatch):
     """Let the other axes leave the case unchanged."""
-    monkeypatch.setattr(choosing, "AXES", ())
+    monkeypatch.setattr(choosing, "SHARES", {})
 
 
 def auto(path: Path, *overrides: str):
@@ -329,7 +329,7 @@ def test_dimension_follows_the_accuracy(plane_path, accuracy, dimension):
 
 def test_probe_finds_the_closed_form_and_the_mean_load(plane_path):
     """P = F / 2 (sin θ + µ cos θ) per length in the plane; mid-slot carries less than the mean."""
-    probe = choose_dimension(auto(plane_path)).probe
+    probe = choose_dimension(auto(plane_path), 0.045).probe
     for flank in ("intrados", "extrados"):
         assert probe["two"][flank]["P"] == pytest.approx(1301.33, rel=1e-3)
         assert 0.9 < probe["three"][flank]["P"] / probe["two"][flank]["P"] < 1.0
@@ -337,7 +337,7 @@ def test_probe_finds_the_closed_form_and_the_mean_load(plane_path):
 
 
 def test_skewed_slot_stays_in_space_unprobed(plane_path):
-    decision = choose_dimension(auto(plane_path, "structure.skew=5 deg"))
+    decision = choose_dimension(auto(plane_path, "structure.skew=5 deg"), 0.045)
     assert decision.value == 3
     assert not decision.probe
     assert "skewed" in decision.why
@@ -346,7 +346,7 @@ def test_skewed_slot_stays_in_space_unprobed(plane_path):
 @pytest.mark.slow
 def test_a_slot_rounded_far_in_stays_in_space(plane_path):
     """Its middle carries the load of its ends as well: far more than the mean."""
-    decision = choose_dimension(auto(plane_path, "structure.end_width=20 mm"))
+    decision = choose_dimension(auto(plane_path, "structure.end_width=20 mm"), 0.045)
     assert decision.value == 3
     for flank in ("intrados", "extrados"):
         assert decision.probe["differences"][flank]["P"] > 0.2
@@ -358,7 +358,7 @@ def test_a_probe_that_fails_decides_nothing(plane_path, monkeypatch):
         raise MethodFailed("no convergence")
 
     monkeypatch.setattr(StructureLoads, "unworn", fail)
-    decision = choose_dimension(auto(plane_path))
+    decision = choose_dimension(auto(plane_path), 0.045)
     assert decision.value == 3
     assert "no convergence" in decision.why
 

@@ -4,54 +4,71 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from workflow.shell.terminal.reporter import Reporter
 
+# Relative tolerance on an error that equals its allowed part except for rounding.
+ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Decision:
-    """Decision on one setting: the ``value`` of a dotted ``entry``, the reason, and probe results.
+    """Decision on one setting: the ``chosen`` values by dotted entry, the main one first, and why.
 
-    ``also`` are entries that go with it. ``allowed`` is the part of the accuracy that the setting
-    may use and ``error`` the estimated part it uses, both relative to depth and volume; None
-    without an estimate. ``met`` says whether the estimate is within the allowed part.
+    ``allowed`` is the part of the accuracy that the setting may use and ``error`` the estimated
+    part it uses, both relative to depth and volume; None without an estimate. ``probe`` has the
+    results of probe runs.
     """
 
-    entry: str
-    value: Any
+    chosen: Mapping[str, Any]
     why: str
-    probe: dict[str, Any] = field(default_factory=dict)
-    also: dict[str, Any] = field(default_factory=dict)
     allowed: float | None = None
     error: float | None = None
-    met: bool = True
+    probe: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
 
     @property
-    def chosen(self) -> dict[str, Any]:
-        """Values of all entries of the decision."""
-        return {self.entry: self.value, **self.also}
+    def value(self) -> Any:
+        """Value of the main entry."""
+        return next(iter(self.chosen.values()))
+
+    @property
+    def met(self) -> bool:
+        """True if the estimated error is within the allowed part, or no part is allotted."""
+        if self.allowed is None:
+            return True
+        return self.error is not None and self.error <= self.allowed * (1.0 + ROUNDING)
+
+    def timed(self, begin: float) -> Decision:
+        """Return the decision with the seconds since ``time.perf_counter()`` returned ``begin``."""
+        return replace(self, seconds=_since(begin))
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The decision as data for JSON."""
+        (entry, value), *also = self.chosen.items()
+        further = {**vars(self), "also": dict(also), "met": self.met}
+        del further["chosen"]
+        return {"entry": entry, "value": value, **further}
 
 
-def since(begin: float) -> float:
-    """Return the seconds since ``time.perf_counter()`` returned ``begin``."""
+def _since(begin: float) -> float:
     return round(time.perf_counter() - begin, 2)
 
 
-def record_of(decisions: Sequence[Decision], accuracy: float, seconds: float) -> dict[str, Any]:
-    """Return the decisions that are to meet ``accuracy`` as data for JSON."""
+def record_of(decisions: Sequence[Decision], accuracy: float, begin: float) -> dict[str, Any]:
+    """Return the decisions since ``begin`` that are to meet ``accuracy``, as data for JSON."""
+    records = [decision.record for decision in decisions]
     return {
         "accuracy": accuracy,
-        "budget": {decision.entry: decision.allowed for decision in decisions},
+        "budget": {record["entry"]: record["allowed"] for record in records},
         "estimated_error": sum(decision.error or 0.0 for decision in decisions),
         "met": all(decision.met for decision in decisions),
-        "chosen": {
-            name: value for decision in decisions for name, value in decision.chosen.items()
-        },
-        "decisions": [asdict(decision) for decision in decisions],
-        "seconds": seconds,
+        "chosen": {k: value for decision in decisions for k, value in decision.chosen.items()},
+        "decisions": records,
+        "seconds": _since(begin),
     }
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from math import ceil, inf, isfinite, sqrt
 from typing import Any, Generic, TypeVar
@@ -23,15 +22,16 @@ import numpy as np
 from fe_models.structure import InterfaceHistory
 from sa_solver.cycles.increments import depth_and_energy, errors_of_increments, friction_work
 from sa_solver.types import Array, Mask
+from workflow.analyses.wear.approximations.convergence import share_of_difference
+from workflow.analyses.wear.approximations.ladders import INCREMENTS_ORDER
+from workflow.analyses.wear.approximations.probe_runs import LESSER_INTERFACE
 from workflow.analyses.wear.case.base import MOST_INCREMENTS, FiniteElementCase
-from workflow.analyses.wear.choice import Decision, record_of, since
-from workflow.analyses.wear.fidelity.estimate import LESSER_FLANK
+from workflow.analyses.wear.choice import Decision, record_of
 from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
 from workflow.models.structure_model import StructureModel
 
-ENTRY = "load_path.increments"
 # Least increments of a leg. Two cause 6 % of error in the depth of a dovetail but an estimate of
 # 0.2 %, because the estimate sees curvature within an increment only through its neighbours.
 FEWEST = 4
@@ -55,9 +55,7 @@ def choose_increments(
     """
     begin, allowed = time.perf_counter(), case.wear.tolerance
     decision = decide_increments(case, model, allowed)
-    seconds = since(begin)
-    record = record_of([replace(decision, seconds=seconds)], allowed, seconds)
-    return changed(case, decision.chosen), record
+    return changed(case, decision.chosen), record_of([decision.timed(begin)], allowed, begin)
 
 
 def decide_increments(
@@ -71,18 +69,16 @@ def decide_increments(
         factor = min(max(sqrt(tried[-1][1] / allowed), FINER), FINEST)
         counts = _capped([ceil(factor * count) for count in counts])
         tried.append((counts, cycle.error(counts)))
-    error, settings = tried[-1][1], case.divided(counts)
-    met = error <= allowed
+    error = tried[-1][1]
     why = (
         f"{' + '.join(map(str, counts))} in the legs of a cycle leave {100 * error:.2g} % of "
-        f"{100 * allowed:.2g} % allowed{'' if met else ', the most that are offered'}"
+        f"{100 * allowed:.2g} % allowed{'' if error <= allowed else ', the most that are offered'}"
     )
     if any(case.legs):
         why += f"; the case's own {sum(case.legs)} leave {100 * cycle.error(case.legs):.2g} %"
-    known = [left if isfinite(left) else None for _, left in tried]
+    known = [error if isfinite(error) else None for _, error in tried]
     probe = {"legs": [legs for legs, _ in tried], "errors": known}
-    also = {entry: value for entry, value in settings.items() if entry != ENTRY}
-    return Decision(ENTRY, settings[ENTRY], why, probe, also, allowed, error, met)
+    return Decision(case.divided(counts), why, allowed, error, probe)
 
 
 class _Cycle(Generic[AnyCase]):
@@ -113,9 +109,9 @@ class _Cycle(Generic[AnyCase]):
         counts = self._few
         while sum(counts) < MOST_INCREMENTS:
             histories = self._solved(counts)
-            left = None if histories is None else left_by_legs(histories, counts)
-            if left is not None:
-                weights = [(error * n**2) ** (1 / 3) for error, n in zip(left, counts, strict=True)]
+            errors = None if histories is None else errors_by_leg(histories, counts)
+            if errors is not None:
+                weights = [(e * n**2) ** (1 / 3) for e, n in zip(errors, counts, strict=True)]
                 needed = [ceil(weight * sqrt(sum(weights) / allowed)) for weight in weights]
                 return _capped([max(FEWEST, count) for count in needed])
             counts = _capped([2 * count for count in counts])
@@ -126,7 +122,8 @@ class _Cycle(Generic[AnyCase]):
         coarse, fine = self._solved(counts), self._solved(tuple(2 * count for count in counts))
         if coarse is None or fine is None:
             return UNKNOWN
-        return 4.0 / 3.0 * float(differences(coarse, fine).max())
+        share = share_of_difference(2.0, INCREMENTS_ORDER)
+        return share * float(differences(coarse, fine).max())
 
 
 def _capped(counts: Sequence[int]) -> Counts:
@@ -141,14 +138,14 @@ def _capped(counts: Sequence[int]) -> Counts:
     return tuple(capped)
 
 
-def left_by_legs(histories: Histories, counts: Counts) -> list[float] | None:
+def errors_by_leg(histories: Histories, counts: Counts) -> list[float] | None:
     """Return the estimated error due to each leg's increments, or None if it is unknown.
 
     Errors are relative to depth and energy of a face, or to a share of those of a face that is
     rubbed much more.
     """
     works = [_work(history).sum(axis=0) for history in histories]
-    ends, left = np.cumsum((0, *counts)), np.zeros(len(counts))
+    ends, largest = np.cumsum((0, *counts)), np.zeros(len(counts))
     for history, work, scale in zip(histories, works, _scales(histories, works), strict=True):
         if not work.any():
             continue
@@ -157,8 +154,8 @@ def left_by_legs(histories: Histories, counts: Counts) -> list[float] | None:
             return None
         of_cycle = errors.reshape(-1, ends[-1], errors.shape[1]).sum(axis=0)
         parts = [of_cycle[begin:end].sum(axis=0) for begin, end in pairwise(ends)]
-        left = np.maximum(left, [np.max(_size(history, part) / scale) for part in parts])
-    return [float(error) for error in left]
+        largest = np.maximum(largest, [np.max(_size(history, part) / scale) for part in parts])
+    return [float(error) for error in largest]
 
 
 def differences(coarse: Histories, fine: Histories) -> Array:
@@ -190,4 +187,4 @@ def _size(history: InterfaceHistory, work: Array) -> Array:
 def _scales(histories: Histories, works: Sequence[Array]) -> Array:
     """Return the values that errors of each face are relative to ``(faces, 2)``."""
     sizes = np.array([_size(*pair) for pair in zip(histories, works, strict=True)])
-    return np.asarray(np.maximum(sizes, LESSER_FLANK * sizes.max(axis=0)))
+    return np.asarray(np.maximum(sizes, LESSER_INTERFACE * sizes.max(axis=0)))

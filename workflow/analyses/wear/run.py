@@ -14,7 +14,7 @@ from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, MotionError
 from wear.coupled import CoupledState
 from wear.steps.stepping import ContactFailure
-from workflow.analyses.wear.budget.finding import Begun, lives_of_companions
+from workflow.analyses.wear.budget.finding import ProbeResults, begin_probe_runs
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.checks.warnings import (
     warn_of_contact,
@@ -56,9 +56,9 @@ def run_wear(run: Run[WearCase]) -> None:
     try:
         with ExitStack() as working:
             with kept_steps(run) as steps:
-                outcome, lives = _compute(run, working, steps)
+                outcome, probe_results = _compute(run, working, steps)
             with one_thread():
-                write_output(outcome, lives, run)
+                write_output(outcome, probe_results, run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
         remedy = f"; the state is kept, see `{folder.resume_command}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
@@ -72,7 +72,9 @@ def run_wear(run: Run[WearCase]) -> None:
         raise UserError(f"{folder.case}: structure: {error}") from error
 
 
-def _compute(run: Run[WearCase], working: ExitStack, steps: RunSteps) -> tuple[Outcome, Begun]:
+def _compute(
+    run: Run[WearCase], working: ExitStack, steps: RunSteps
+) -> tuple[Outcome, ProbeResults]:
     """Return the outcome of the run before its files are written, and its probe runs.
 
     The contacts may solve their last cycles while the stress of the structure is computed;
@@ -91,7 +93,7 @@ def _compute(run: Run[WearCase], working: ExitStack, steps: RunSteps) -> tuple[O
     )
     with reported_stage(reporter, source, "condensation", "steps"):
         source.prepare()
-    lives = lives_of_companions(case, source, reporter, run.beside)
+    probe_results = begin_probe_runs(case, source, reporter, run.beside)
     with one_thread():
         with reported_stage(reporter, source, "structural friction", "increments"):
             unworn = source.unworn()
@@ -110,7 +112,7 @@ def _compute(run: Run[WearCase], working: ExitStack, steps: RunSteps) -> tuple[O
         InterfaceOutcome(*column, state.cycles, state.kinetics[:, number], finer)
         for number, column in enumerate(zip(*columns, strict=True))
     ]
-    return Outcome(case, source, state, interfaces), lives
+    return Outcome(case, source, state, interfaces), probe_results
 
 
 def _told_once(

@@ -49,7 +49,7 @@ STRESS, SEARCHED, CARRIED = 1.2e-6, 10.0, 1e-6
 # Probe runs in a worker process for the errors of mesh, grid and coupling: their number, steps and
 # largest number of cells per axis; time of mesh and factors of their structures, and of a friction
 # iteration in the plane [s].
-LIVES, LIFE_STEPS, LIFE_CELLS = 4, 6, 64
+PROBE_RUNS, PROBE_STEPS, PROBE_CELLS = 4, 6, 64
 PLANE, PLANE_ITERATION = 0.5, 1e-4
 # Time of stress and mesh of the structure at the end, in sparse factors; of figures and files [s].
 WORN, PICTURES = 2.0, 6.0
@@ -91,11 +91,9 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
     plane = getattr(case.structure, "dimension", 3) == 2 or case.contact.grid[1] == 1
     grids = [terms.grid[:1] if plane else terms.grid for terms in case.every_terms]
     cells = sum(map(prod, grids)) // len(grids)
-    at_once = min(extent.faces, os.cpu_count() or 1)
-    shared = extent.faces / at_once
-    taken = steps_of(case, extent)
-    steps, jumps = taken.count, taken.jumps
-    normal = NORMAL_LINE if plane else NORMAL
+    shared = extent.faces / min(extent.faces, os.cpu_count() or 1)
+    expected = steps_of(case, extent)
+    steps, jumps, normal = expected.count, expected.jumps, NORMAL_LINE if plane else NORMAL
     in_a_step = extent.increments * extent.dissipating * PROBLEMS[case.wear.step.kind]
     begun = solves(2 * extent.increments, cells, normal)
     worn = solves(steps * in_a_step, cells, normal)
@@ -114,9 +112,9 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
     cycle = _structural_cycle(extent)
     before = shared * begun + _condensation(extent) + CYCLES * cycle
     after = PICTURES + WORN * factors(extent.nodes) + cycle + _stress(case, extent, cells)
-    after += _lives(case, extent, plane)
-    assumed = counted(ceil(jumps), "wear jump") if taken.unknown else ""
-    return RunTime(before, shared * worn + again * cycle, after, assumed, taken.unknown)
+    after += _probe_runs(case, extent, plane)
+    assumed = counted(ceil(jumps), "wear jump") if expected.unknown else ""
+    return RunTime(before, shared * worn + again * cycle, after, assumed, expected.unknown)
 
 
 def steps_of(case: WearCase, extent: Extent) -> ExpectedSteps:
@@ -135,26 +133,22 @@ def steps_of(case: WearCase, extent: Extent) -> ExpectedSteps:
         return ExpectedSteps(steps, RECORDED)
     for size in ("depth", "volume"):
         if (worn := getattr(step, size)) is not None:
-            end = getattr(wear.stop, size)
-            if end is not None:
+            if (end := getattr(wear.stop, size)) is not None:
                 return ExpectedSteps(ceil(end / worn), ceil(end / worn))
             return ExpectedSteps(BY_SIZE, BY_SIZE, UNKNOWN.format(f"the {size} worn"))
-    finer = 1.0 if wear.depth_tolerance is not None else max(1.0, sqrt(0.01 / wear.tolerance))
+    steps, unknown = float(AUTOMATIC), ""
     if case.contact.method == "full":
-        return ExpectedSteps(
-            finer * AUTOMATIC_FULL, 0.5 * finer * AUTOMATIC_FULL, UNKNOWN.format(STICKING)
-        )
-    return ExpectedSteps(finer * AUTOMATIC, 0.5 * finer * AUTOMATIC)
+        steps, unknown = AUTOMATIC_FULL, UNKNOWN.format(STICKING)
+    if wear.depth_tolerance is None:
+        steps *= max(1.0, sqrt(0.01 / wear.tolerance))
+    return ExpectedSteps(steps, 0.5 * steps, unknown)
 
 
 def _stable(case: WearCase, extent: Extent) -> float:
     """Return an estimate of the longest stable explicit step [cycles]."""
     bodies = [case.material(number) for number in (1, 2)]
     compliance = sum((1.0 - body.poisson**2) / body.young for body in bodies)
-    worn = 0.0
-    for number in (1, 2):
-        law = case.wear_of(number)
-        worn += law.rate(case.friction.coefficient)
+    worn = sum(case.wear_of(number).rate(case.friction.coefficient) for number in (1, 2))
     size = getattr(case.contact, "size", None) or getattr(case.structure, "size", None)
     length = size[0] if isinstance(size, tuple) else (size or 10.0)
     pitch = length / case.contact.grid[0]
@@ -181,20 +175,20 @@ def _stress(case: WearCase, extent: Extent, cells: int) -> float:
     return 2.0 * (searched + carried) * extent.faces * extent.increments * cells
 
 
-def _lives(case: WearCase, extent: Extent, plane: bool) -> float:
+def _probe_runs(case: WearCase, extent: Extent, plane: bool) -> float:
     """Return the time of probe runs for the error budget, one of them on a finer mesh [s]."""
     if case.error_budget == "known" or case.contact.method == "nodes":
         return 0.0
-    plane, life = plane or extent.section is not None, extent.section or extent
-    across, along = (min(count, LIFE_CELLS) for count in case.contact.grid)
+    plane, probed = plane or extent.section is not None, extent.section or extent
+    across, along = (min(count, PROBE_CELLS) for count in case.contact.grid)
     cells, kind = (across, NORMAL_LINE) if plane else (across * along // 4, NORMAL)
-    lives = LIVES if life.interface_nodes else LIVES // 2
-    solved = lives * life.faces * life.increments * (1.0 + LIFE_STEPS * life.dissipating)
+    runs = PROBE_RUNS if probed.interface_nodes else PROBE_RUNS // 2
+    solved = runs * probed.faces * probed.increments * (1.0 + PROBE_STEPS * probed.dissipating)
     contacts = solves(solved, cells, kind)
-    if not life.interface_nodes or case.recoupling.resultants == "constant":
+    if not probed.interface_nodes or case.recoupling.resultants == "constant":
         return contacts
-    finer = replace(life, interface_nodes=2.0 * life.interface_nodes)
-    own, other = (LIFE_STEPS / 2 * _structural_cycle(mesh) for mesh in (life, finer))
+    finer = replace(probed, interface_nodes=2.0 * probed.interface_nodes)
+    own, other = (PROBE_STEPS / 2 * _structural_cycle(mesh) for mesh in (probed, finer))
     # In the other probe runs the loads stay constant.
-    iterated = LIFE_STEPS * life.increments * ITERATIONS * PLANE_ITERATION
+    iterated = PROBE_STEPS * probed.increments * ITERATIONS * PLANE_ITERATION
     return contacts + own + other + 2.0 * PLANE + iterated

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
+from workflow.analyses.wear.approximations.approximation import Neighbour
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.run_time import Extent
 from workflow.shell.analysis import as_written
@@ -25,16 +26,6 @@ AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 SPECTRA = 300
 # Number of dense interface matrices that are held while a joint is condensed.
 DENSE_MATRICES = 6
-
-# Setting that reduces each part of the error of a run. Those for steps and delayed loads depend on
-# the case (workflow.analyses.wear.checks.run_errors).
-SETTINGS = {
-    "link": "the mesh of the contact faces",
-    "mesh": "the mesh of the structure",
-    "increments": "load_path.increments",
-    "grid": "contact.grid",
-    "solver": "contact.tolerance",
-}
 
 
 def memory(
@@ -56,18 +47,6 @@ def memory(
     return Memory(dense + cells * kept, remedy, factor_bytes(nodes))
 
 
-@dataclass(frozen=True)
-class Finer(Generic[AnyWearCase]):
-    """A finer mesh for the error due to that of a case, which is ``share`` times the difference.
-
-    ``mesh`` are its entries in the case, or in the plane ``section`` that represents the case.
-    """
-
-    mesh: Mapping[str, Any]
-    share: float = 1.0
-    section: AnyWearCase | None = None
-
-
 def no_cycles(case: WearCase, state: InterfaceState) -> None:
     """Return None: the loads between two increments, or slips due to friction, are unknown."""
 
@@ -80,11 +59,12 @@ class WearStructure(Generic[AnyWearCase]):
     of loads. ``extent`` returns the size of its loads, for the time estimate, and ``memory`` the
     memory of a run, given the nodes of both bodies and of all interfaces (0: unknown). ``choose``
     returns the case with its open settings decided, and a record of why. ``warnings`` are about the
-    unworn contact of a stage under a peak load [N]. ``finer`` returns a finer mesh, if there is a
-    cheap one. ``finer_cycles`` returns the unworn cycle and that on the surfaces of a state in
+    unworn contact of a stage under a peak load [N]. ``section`` returns a plane section that
+    represents the case in probe runs, and ``finer`` a finer mesh, if there is a cheap one.
+    ``finer_cycles`` returns the unworn cycle and that on the surfaces of a state in
     twice as many increments, if the loads in between are known and the half-space solves for the
     slips. ``settings`` returns the settings that reduce parts of the error, where they differ from
-    :data:`SETTINGS`.
+    those of all cases.
     """
 
     name: str
@@ -94,7 +74,8 @@ class WearStructure(Generic[AnyWearCase]):
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
     warnings: Callable[[AnyWearCase, FaceContact, float], Iterable[str]] = lambda *_: ()
-    finer: Callable[[AnyWearCase], Finer[AnyWearCase] | None] = lambda _: None
+    section: Callable[[AnyWearCase], AnyWearCase | None] = lambda _: None
+    finer: Callable[[AnyWearCase], Neighbour | None] = lambda _: None
     finer_cycles: Callable[[AnyWearCase, InterfaceState], list[CycleTractions] | None] = no_cycles
     settings: Callable[[AnyWearCase], Mapping[str, str]] = lambda _: {}
 

@@ -40,7 +40,7 @@ def of_file(folder: Path, energy: float):
     return case, *begun(source, face_contact(case, source.faces[0]), source.unworn()[0])
 
 
-def told(folder, case, source, stage, state, first) -> list[str]:
+def warnings_of(folder, case, source, stage, state, first) -> list[str]:
     """Return the warnings about energies."""
 
     class Both:
@@ -55,20 +55,20 @@ def test_energies_of_a_file_that_the_half_space_contradicts(tmp_path):
     case, *contact, first = of_file(tmp_path, 18.0)
     found = first.energy.sum()
     assert 0.0 < found < 1.0
-    (line,) = told(tmp_path, case, *contact, first)
+    (line,) = warnings_of(tmp_path, case, *contact, first)
     assert f"says that 36 N are dissipated a cycle, the half-space finds {found:.3g}" in line
     assert "check Edx and Edy" in line
     # The half-space's own are believed, and so are those of a mesh that is a little coarse.
     for factor in (1.0, 1.2, 0.8):
         scene = of_file(tmp_path, 0.5 * factor * found)
-        assert told(tmp_path, *scene) == []
+        assert warnings_of(tmp_path, *scene) == []
 
 
 def test_energies_that_are_hardly_any_contradict_nothing(tmp_path):
     """Rounding of a table causes no warning where everything sticks."""
     case, source, stage, state, first = of_file(tmp_path, 1e-6)
     nothing = replace(first, energy=0.0 * first.energy)
-    assert told(tmp_path, case, source, stage, state, nothing) == []
+    assert warnings_of(tmp_path, case, source, stage, state, nothing) == []
 
 
 @pytest.mark.parametrize(("share", "warned"), [(1.0, False), (0.5, False), (1.7e-4, True)])
@@ -80,7 +80,7 @@ def test_nodes_that_dissipate_what_the_half_space_does_not(tmp_path, share, warn
     scene = begun(source, face_contact(case, source.faces[0]), source.unworn()[0])
     first: FirstContact = scene[-1]
     less = replace(first, energy=share * first.energy)
-    lines = told(tmp_path, case, *scene[:-1], less)
+    lines = warnings_of(tmp_path, case, *scene[:-1], less)
     assert len(lines) == warned
     if warned:
         assert f"the half-space with its own friction {less.energy.sum():.3g}" in lines[0]

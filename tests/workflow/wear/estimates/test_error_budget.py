@@ -15,16 +15,17 @@ from fe_models.meshes.structure_mesh import MeshError
 from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import settings
 from workflow.analyses.wear import run
-from workflow.analyses.wear.budget import companions as lives_of
-from workflow.analyses.wear.budget import finding, lives
-from workflow.analyses.wear.budget.companions import Companions
-from workflow.analyses.wear.budget.lives import STEPS, live
-from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_left
+from workflow.analyses.wear.approximations import probe_runs, registry
+from workflow.analyses.wear.approximations.probe_runs import STEPS, Numbers, probe_run
+from workflow.analyses.wear.budget import finding, probe_cases
+from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_lowered
+from workflow.analyses.wear.budget.probe_cases import ProbeCases, late, scaled
 from workflow.analyses.wear.budget.report import datasets_of, sentences, summary_of, warning_of
 from workflow.analyses.wear.checks import run_errors
+from workflow.analyses.wear.checks.run_errors import REMEDIES
+from workflow.analyses.wear.fidelity.choosing import SHARES
 from workflow.analyses.wear.output.layout import PARTS
 from workflow.analyses.wear.output.outcome import InterfaceOutcome, peak_change
-from workflow.analyses.wear.structure import SETTINGS
 from workflow.analyses.wear.structures import structure_of
 from workflow.case.changing import changed
 from workflow.kinds import load_case
@@ -33,12 +34,12 @@ CASES = Path(__file__).parents[4] / "cases"
 QUIET = ("output.figures=false", "output.paraview=false", "stress.section=none")
 
 
-ALIVE = finding.lives_of_companions  # before the tests' runs do without
+BEGIN_PROBE_RUNS = finding.begin_probe_runs  # before the tests' runs do without
 
 
 @pytest.fixture(autouse=True)
-def _companions_live(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "lives_of_companions", ALIVE)
+def _with_probe_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "begin_probe_runs", BEGIN_PROBE_RUNS)
 
 
 # --- parts ----------------------------------------------------------------------------------------
@@ -48,23 +49,23 @@ def test_a_smooth_peak_is_all_but_what_it_is_on_cells_of_twice_the_size() -> Non
     """Hertz's p0 sqrt(1 - (x/a)²) falls by h²/8 p'' = 1 / (2 k²) halfway between two cells."""
     across = 41
     x = 2.0 * (np.arange(across) - across // 2) / across
-    assert peak_left(np.sqrt(1.0 - x**2)[:, None]) == pytest.approx(1.0 / across**2, rel=0.02)
+    assert peak_lowered(np.sqrt(1.0 - x**2)[:, None]) == pytest.approx(1.0 / across**2, rel=0.02)
 
 
-def test_a_peak_without_a_limit_is_told_by_its_cells() -> None:
+def test_a_peak_without_a_limit_is_found_by_its_cells() -> None:
     """Means of x^-1/2 over [0, h] and [0, 2h] have the ratio 1 : 1/√2, however small h is."""
     edges = np.linspace(0.0, 1.0, 65)
     means = np.diff(2.0 * np.sqrt(edges)) / np.diff(edges)
-    assert peak_left(means[:, None]) == pytest.approx(1.0 - 1.0 / np.sqrt(2.0), rel=1e-12)
+    assert peak_lowered(means[:, None]) == pytest.approx(1.0 - 1.0 / np.sqrt(2.0), rel=1e-12)
     in_plane = means[:, None] * np.ones((1, 7))
-    assert peak_left(in_plane) == pytest.approx(peak_left(means[:, None]), rel=1e-12)
+    assert peak_lowered(in_plane) == pytest.approx(peak_lowered(means[:, None]), rel=1e-12)
 
 
 def test_nothing_pressed_has_no_peak() -> None:
-    assert peak_left(np.zeros((4, 3))) == 0.0
+    assert peak_lowered(np.zeros((4, 3))) == 0.0
 
 
-# --- what is told ---------------------------------------------------------------------------------
+# --- report ---------------------------------------------------------------------------------------
 
 ERROR = ResultError({"link": 0.004, "mesh": 0.03, "increments": None, "steps": 0.012})
 
@@ -72,8 +73,8 @@ ERROR = ResultError({"link": 0.004, "mesh": 0.03, "increments": None, "steps": 0
 def test_parts_add_up_and_unknown_ones_are_named() -> None:
     assert ERROR.total == pytest.approx(0.046)
     assert summary_of({"depth": ERROR})["depth"] == {**ERROR.parts, "total": ERROR.total}
-    said = list(sentences({"depth": ERROR}))
-    assert said == [
+    lines = list(sentences({"depth": ERROR}))
+    assert lines == [
         "estimated errors: depth 4.6%",
         "most of depth: mesh 3.0%, steps 1.2%; unknown: increments",
     ]
@@ -105,17 +106,24 @@ def test_one_sign_is_the_sum_of_sizes() -> None:
 
 def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> None:
     errors = {"depth": ERROR, "worn_peak_pressure": ERROR}
-    assert warning_of("pad", errors, 0.05, SETTINGS) is None
-    line = warning_of("pad", errors, 0.04, SETTINGS)
+    assert warning_of("pad", errors, 0.05, REMEDIES) is None
+    line = warning_of("pad", errors, 0.04, REMEDIES)
     assert line is not None
     assert "depth 4.6%" in line
     assert "worn peak" not in line  # edges may be farther off
-    assert SETTINGS["mesh"] in line
+    assert REMEDIES["mesh"] in line
 
 
-def companions_of(case) -> Companions:
+def test_every_part_of_the_budget_is_an_approximation() -> None:
+    """The registry names all parts and all settings that ``fidelity: auto`` decides."""
+    assert {*registry.PARTS} == {*PARTS}
+    decided = {known.name for known in registry.APPROXIMATIONS if known.decide is not None}
+    assert decided == {"dimension", *SHARES}
+
+
+def probe_cases_of(case) -> ProbeCases:
     structure = structure_of(case)
-    return Companions.of(case, structure.finer(case), structure.source(case).line)
+    return ProbeCases.of(case, structure, structure.source(case).line)
 
 
 # --- peaks that wear steps leave ------------------------------------------------------------------
@@ -148,13 +156,13 @@ BARE = ("error_budget=known", "output={figures: false, paraview: false, report: 
 
 
 @pytest.mark.parametrize("step", ["{kind: implicit}", "{kind: second_order}"])
-def test_steps_tell_what_they_leave_of_a_peak(step, tmp_path) -> None:
+def test_error_of_a_peak_due_to_steps(step, tmp_path) -> None:
     """Automatic steps of either kind leave 1.5 and 2.8 %; 44 and 27 % were once reported."""
     run = _summary_of(CYLINDER, tmp_path, *BARE, f"wear.step={step}")
-    told, peak = (run["interface"][key] for key in ("step_error", "peak_pressure"))
+    error, peak = (run["interface"][key] for key in ("step_error", "peak_pressure"))
     true = abs(peak["worn"] / CONFORMING - 1.0)
     assert 0.005 < true < 0.05
-    assert true / 3.0 < told["pressure"] < 3.0 * true
+    assert true / 3.0 < error["pressure"] < 3.0 * true
     assert run["warnings"] == []
 
 
@@ -194,7 +202,7 @@ def dovetail(tmp_path_factory):
         if asked not in runs:
             with pytest.MonkeyPatch.context() as patch:
                 advised: dict[str, str] = {}
-                patch.setattr(run_errors, "warning_of", lambda *told: advised.update(told[3]))
+                patch.setattr(run_errors, "warning_of", lambda *given: advised.update(given[3]))
                 folder = tmp_path_factory.mktemp("run") / "out"
                 summary = _summary(folder, *BUDGET_KNOWN, *asked)
             runs[asked] = summary["intrados"]["depth_1"], advised
@@ -259,88 +267,99 @@ def section():
     return load_case(CASES / "dovetail_2d.yaml", [*coarse, "mesh.order=1"])
 
 
-def test_companions_differ_in_one_thing_each(section) -> None:
-    companions = companions_of(section)
-    own, finer, other = companions.own, companions.finer, companions.regridded
-    assert companions.linked is None
-    assert companions.coupled
+def neighbour(cases: ProbeCases, part: str):
+    """Return the probe case with the other setting of a part."""
+    return changed(cases.own, cases.neighbours[part].settings)
+
+
+def test_probe_cases_differ_in_one_thing_each(section) -> None:
+    cases = probe_cases_of(section)
+    own, finer, other = cases.own, neighbour(cases, "mesh"), neighbour(cases, "grid")
+    assert "link" not in cases.neighbours
+    assert cases.coupled
     assert changed(finer, {"mesh": own.mesh}) == own
     assert changed(other, {"contact.grid": own.contact.grid}) == own
     assert (finer.mesh.flank_nodes[0] - 1, finer.mesh.size) == (2 * 11, 4.0)
     assert other.contact.grid[0] == 2 * own.contact.grid[0]
-    assert companions.grid_share == pytest.approx(4.0 / 3.0)
+    assert cases.neighbours["grid"].share == pytest.approx(4.0 / 3.0)
 
 
-def test_few_strips_are_compared_with_those_of_a_life(section) -> None:
+def test_few_strips_are_compared_with_those_of_a_probe_run(section) -> None:
     """At second order, 24 cells are off by 64² / (64² - 24²) of their difference from 64."""
-    few = companions_of(changed(section, {"contact.grid": (24, 24)}))
-    assert (few.own.contact.grid, few.regridded.contact.grid) == ((64, 24), (24, 24))
-    assert few.grid_share == pytest.approx(-1.0 / (1.0 - (24 / 64) ** 2))
-    many = companions_of(changed(section, {"contact.grid": (256, 24)}))
-    assert (many.own.contact.grid, many.regridded.contact.grid) == ((64, 24), (128, 24))
-    assert many.grid_share == pytest.approx(4.0 / 3.0 / 4**2)
+    few = probe_cases_of(changed(section, {"contact.grid": (24, 24)}))
+    assert few.own.contact.grid == (64, 24)
+    assert neighbour(few, "grid").contact.grid == (24, 24)
+    assert few.neighbours["grid"].share == pytest.approx(-1.0 / (1.0 - (24 / 64) ** 2))
+    many = probe_cases_of(changed(section, {"contact.grid": (256, 24)}))
+    assert many.own.contact.grid == (64, 24)
+    assert neighbour(many, "grid").contact.grid == (128, 24)
+    assert many.neighbours["grid"].share == pytest.approx(4.0 / 3.0 / 4**2)
 
 
 def test_a_joint_in_space_is_judged_by_its_section() -> None:
     case = load_case(CASES / "dovetail.yaml")
-    companions = companions_of(case)
-    assert not companions.same
-    assert companions.own.structure.dimension == companions.finer.structure.dimension == 2
-    assert companions.own.mesh == case.mesh
+    cases = probe_cases_of(case)
+    assert not cases.same
+    assert cases.own.structure.dimension == neighbour(cases, "mesh").structure.dimension == 2
+    assert cases.own.mesh == case.mesh
 
 
-def test_half_spaces_have_a_companion_that_is_linked(section) -> None:
+def test_half_spaces_are_compared_with_linked_ones(section) -> None:
     case = changed(section, {"contact.link": "half_space"})
-    companions = companions_of(case)
-    assert companions.linked is not None
-    assert companions.linked.contact.link == "corrected"
+    assert neighbour(probe_cases_of(case), "link").contact.link == "corrected"
 
 
-def test_a_life_that_fails_leaves_its_own_part_unknown(section, monkeypatch) -> None:
+def test_a_probe_run_that_fails_leaves_its_own_part_unknown(section, monkeypatch) -> None:
     """The structure of the finer mesh fails, and the other probe runs do not."""
-    lived = []
+    begun = []
 
-    def live(case, source, kind="constant", begun=None):
-        if case is failing:
+    class Run:
+        states = (SimpleNamespace(drift=np.array([0.0, 0.1, 0.1, 0.1])),)
+
+        def __init__(self) -> None:
+            self.worn_and_pressed: Numbers = {"flank": {"depth": float(len(begun))}}
+
+    def run_of(case, source, kind="constant", first=None):
+        if case == failing:
             raise MeshError("no such mesh")
-        lived.append((case, kind, begun))
-        return [], [SimpleNamespace(drift=np.array([0.0, 0.1, 0.1, 0.1]))]
+        begun.append((case, kind, first))
+        return Run()
 
-    monkeypatch.setattr(lives_of, "live", live)
-    monkeypatch.setattr(lives_of, "_worn", lambda life: {"flank": {"depth": float(len(lived))}})
-    companions, failures = companions_of(section), {}
-    failing = companions.finer
-    errors, rest = companions.errors(None, lambda case: None, failures.__setitem__)
-    coupling = lives_of.scaled(errors["coupling"], lives_of.late(rest, np.ones(1)))
-    assert failures.keys() == {"mesh"}
+    monkeypatch.setattr(probe_cases, "probe_run", run_of)
+    cases = probe_cases_of(section)
+    failing = neighbour(cases, "mesh")
+    probed = cases.probed(None, lambda case: None)
+    coupling = scaled(probed.errors["coupling"]["flank"], late(probed.rate, np.ones(1)))
+    assert probed.failures == {"mesh": "no such mesh"}
     # That of the case wears 1, under unworn loads 2, and so on twice as many strips 3.
-    assert errors["grid"]["flank"]["depth"] == pytest.approx(-companions.grid_share / 3.0)
-    assert coupling["flank"]["depth"] == pytest.approx(STEPS / (STEPS - 1.0), rel=0.01)
-    assert lived[1][:2] == (companions.own, "constant")
-    assert lived[1][2] is not None
+    share = cases.neighbours["grid"].share
+    assert probed.errors["grid"]["flank"]["depth"] == pytest.approx(-share / 3.0)
+    assert coupling["depth"] == pytest.approx(STEPS / (STEPS - 1.0), rel=0.01)
+    assert begun[1][:2] == (cases.own, "constant")
+    assert begun[1][2] is not None
 
-    failing = companions.own
-    with pytest.raises(MeshError):
-        companions.errors(None, lambda case: None, failures.__setitem__)
+    failing = cases.own
+    probed = cases.probed(None, lambda case: None)
+    assert not probed.errors
+    assert probed.failures == {"mesh, grid and coupling": "no such mesh"}
 
 
-def _never(part: str, error: Exception) -> None:
-    raise error
+def deepest(case, source, kind="constant") -> float:
+    """Return the largest depth of the first flank in a probe run."""
+    end = probe_run(case, source, kind).states[-1]
+    return float(end.interfaces[0].surfaces.depth.max())
 
 
 @pytest.mark.slow
-def test_lives_tell_what_loads_that_follow_change(section, monkeypatch) -> None:
+def test_probe_runs_show_what_loads_that_follow_change(section, monkeypatch) -> None:
     """The references are probe runs with four times as many steps, with and without updates."""
-    companions, source = companions_of(section), structure_of(section).source(section)
-    few = replace(companions, finer=None, regridded=None)
-    told, rest = few.errors(source, lambda _: source, _never)
-    monkeypatch.setattr(lives, "STEPS", 4 * STEPS)
-    depths = [
-        live(companions.own, source, kind)[1][-1].interfaces[0].surfaces.depth.max()
-        for kind in ("constant", "every")
-    ]
-    true = depths[0] / depths[1] - 1.0
-    coupling = lives_of.late(rest, np.ones(1)) * told["coupling"]["intrados"]["depth"]
+    cases, source = probe_cases_of(section), structure_of(section).source(section)
+    probed = replace(cases, neighbours={}).probed(source, lambda _: source)
+    assert not probed.failures
+    monkeypatch.setattr(probe_runs, "STEPS", 4 * STEPS)
+    constant, every = (deepest(cases.own, source, kind) for kind in ("constant", "every"))
+    true = constant / every - 1.0
+    coupling = late(probed.rate, np.ones(1)) * probed.errors["coupling"]["intrados"]["depth"]
     assert 0.5 < coupling / true < 2.0
 
 
@@ -356,7 +375,7 @@ def test_loads_are_those_of_the_last_solution(resultants, shares) -> None:
 
 
 @pytest.mark.parametrize("rest", [0.5, 1.5, 2.5])
-def test_loads_that_follow_late_are_told_by_a_life(rest) -> None:
+def test_the_error_of_loads_that_follow_late_is_found(rest) -> None:
     """The error of h' = 1 - z h is found, whatever the steps.
 
     Slow changes neglect squares of the shares of the cycles.
@@ -367,47 +386,46 @@ def test_loads_that_follow_late_are_told_by_a_life(rest) -> None:
         h += share * (1.0 - rest * h)
     for _ in range(STEPS):
         three += (1.0 - rest * three) / STEPS
-    told = lives_of.late(rest, shares) * (1.0 - three)
-    assert told == pytest.approx(h - exact, rel=1e-12)
-    assert lives_of.late(0.0, shares) == pytest.approx(1.5 * np.sum(shares**2), rel=0.01)
+    found = late(rest, shares) * (1.0 - three)
+    assert found == pytest.approx(h - exact, rel=1e-12)
+    assert late(0.0, shares) == pytest.approx(1.5 * np.sum(shares**2), rel=0.01)
 
 
 @pytest.mark.slow
-def test_lives_tell_what_the_mesh_leaves(section) -> None:
+def test_probe_runs_show_the_error_due_to_the_mesh(section) -> None:
     """Meshes of two orders and sizes are compared with one of negligible error."""
     structure = structure_of(section)
-    companions = companions_of(section)
-    told, _ = companions.errors(structure.source(section), structure.source, _never)
-    told = told["mesh"]["intrados"]
+    cases = probe_cases_of(section)
+    probed = cases.probed(structure.source(section), structure.source)
+    assert not probed.failures
+    errors = probed.errors["mesh"]["intrados"]
 
     fine = {"mesh.flank_nodes": (61, 61), "mesh.size": 1.5, "mesh.order": 2}
-    truth = changed(companions.own, fine)
-    (own, exact) = (
-        live(case, structure.source(case), "every")[1][-1].interfaces[0].surfaces.depth
-        for case in (companions.own, truth)
+    truth = changed(cases.own, fine)
+    own, exact = (
+        probe_run(case, structure.source(case), "every").worn["intrados"]
+        for case in (cases.own, truth)
     )
-    for name, true in (
-        ("depth", abs(own.max() / exact.max() - 1.0)),
-        ("volume", abs(own.sum() / exact.sum() - 1.0)),
-    ):
-        assert 0.5 < told[name] / true < 2.0, (name, told[name], true)
+    for name in ("depth", "volume"):
+        true = abs(own[name] / exact[name] - 1.0)
+        assert 0.5 < errors[name] / true < 2.0, (name, errors[name], true)
 
 
 def test_grids_are_compared_by_their_order() -> None:
     """For a body without a structure, the sphere's scar is computed on half as many cells."""
     case = load_case(CASES / "sphere_wear.yaml")
-    companions: Companions = companions_of(case)
-    coarser = case.contact.grid[0] / companions.own.contact.grid[0]
-    assert companions.grid_share == pytest.approx(-1.0 / 3.0 / coarser**2)
-    assert companions.own.contact.grid[0] == 2 * companions.regridded.contact.grid[0]
-    assert companions.finer is None
-    assert not companions.coupled
+    cases = probe_cases_of(case)
+    coarser = case.contact.grid[0] / cases.own.contact.grid[0]
+    assert cases.neighbours["grid"].share == pytest.approx(-1.0 / 3.0 / coarser**2)
+    assert cases.own.contact.grid[0] == 2 * neighbour(cases, "grid").contact.grid[0]
+    assert "mesh" not in cases.neighbours
+    assert not cases.coupled
 
 
 # --- wear that has stopped ------------------------------------------------------------------------
 
 
-def test_wear_that_has_stopped_is_told() -> None:
+def test_wear_that_has_stopped_is_reported() -> None:
     """Depth and volume of both bodies count, and it must have lasted half of the cycles."""
     cycles = np.array([0.0, 1e3, 1e4, 1e5, 1e6])
 
@@ -426,7 +444,7 @@ def test_wear_that_has_stopped_is_told() -> None:
 
 
 @pytest.mark.slow
-def test_a_run_tells_its_errors(tmp_path) -> None:
+def test_a_run_estimates_its_errors(tmp_path) -> None:
     """The parts add up to the difference of depth and volume from a finer run."""
     coarse = "mesh.flank_nodes=[14, 14]", "mesh.size=7 mm", "mesh.order=1", "contact.grid=[64, 64]"
     coarse += ("load_path.increments=[4, 7]",)

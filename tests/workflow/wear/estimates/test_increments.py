@@ -96,7 +96,7 @@ def test_legs_of_a_mesh_get_what_each_asks_for(blocks):
 
 
 @pytest.mark.slow
-def test_a_run_is_of_what_was_chosen_and_tells_it_once(tmp_path, monkeypatch):
+def test_a_run_uses_and_logs_what_was_chosen_once(tmp_path, monkeypatch):
     """A killed and resumed run has the same choice, since nothing is chosen again."""
     overrides = [AUTO, *COARSE]
     with ctrl_c_after_jumps(2):
@@ -108,11 +108,11 @@ def test_a_run_is_of_what_was_chosen_and_tells_it_once(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "choose_increments", None)
     assert command("resume", tmp_path / "out").exit_code == 0
     log = (tmp_path / "out" / "run.log").read_text("utf-8")
-    (told,) = re.findall(r"chosen: load_path.increments: .(\d+), (\d+).: (\d+ \+ \d+) in", log)
+    (logged,) = re.findall(r"chosen: load_path.increments: .(\d+), (\d+).: (\d+ \+ \d+) in", log)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     settings = summary["choice"]["chosen"]
-    assert settings == {"load_path.increments": [int(count) for count in told[:2]]}
-    assert told[2] == " + ".join(told[:2])
+    assert settings == {"load_path.increments": [int(count) for count in logged[:2]]}
+    assert logged[2] == " + ".join(logged[:2])
     assert load_case(tmp_path / "out" / "case.yaml") == kept
 
 
@@ -127,7 +127,7 @@ def test_what_is_chosen_does_not_depend_on_what_is_kept(tmp_path, monkeypatch):
     assert records[0] == records[1] == records[2]
 
 
-def test_more_than_the_most_are_not_chosen_and_it_is_told(monkeypatch):
+def test_more_than_the_most_are_not_chosen(monkeypatch):
     case = load_case(PLANE, [AUTO, *COARSE])
     monkeypatch.setattr(module, "MOST_INCREMENTS", 12)
     decision = decide_increments(case, dovetail_joint, 1e-4)
@@ -154,10 +154,10 @@ def test_nothing_slides_in_the_fewest(blocks):
     assert sum(ANALYSIS.choose(case)[0].legs) == 8
 
 
-def test_check_tells_how_many_there_may_be(blocks):
+def test_check_reports_how_many_there_may_be(blocks):
     for path in (PLANE, blocks):
-        told = command("check", path, overrides=[AUTO, "wear.tolerance=4 %"]).stdout
-        assert "as many increments as leave 4 % of depth, about 12 and at most 1000" in told
+        output = command("check", path, overrides=[AUTO, "wear.tolerance=4 %"]).stdout
+        assert "as many increments as leave 4 % of depth, about 12 and at most 1000" in output
     assert MOST_INCREMENTS == 1000
 
 

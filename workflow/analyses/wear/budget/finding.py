@@ -10,10 +10,12 @@ import numpy as np
 
 from sa_solver.transforms.threads import at_once
 from sa_solver.types import Array, Progress, unseen
-from workflow.analyses.wear.budget.companions import Companions, late, scaled
-from workflow.analyses.wear.budget.lives import LIFE_FAILURES, Worn
-from workflow.analyses.wear.budget.parts import Errors, errors_of
+from workflow.analyses.wear.approximations.probe_runs import Numbers
+from workflow.analyses.wear.approximations.registry import PARTS
+from workflow.analyses.wear.budget.parts import ContactErrors, ErrorByResult, ResultError
+from workflow.analyses.wear.budget.probe_cases import ProbeCases, Probed, late, scaled
 from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.output import layout
 from workflow.analyses.wear.output.outcome import Outcome
 from workflow.analyses.wear.structures import structure_of
 from workflow.models.loads import LoadSource
@@ -21,32 +23,74 @@ from workflow.models.structure import StructureLoads
 from workflow.shell.processes import WorkerProcess
 from workflow.shell.terminal.reporter import Reporter
 
-Lives = dict[str, Worn]  # by part
-Told = tuple[Lives, float, list[tuple[str, str]]]  # how fast loads rest, parts that failed and why
-Begun = Callable[[Array, Progress], Lives]
+# Powers of energy and pressure in a fretting parameter: Ruiz's is work times tension, that of
+# Smith, Watson and Topper stress times strain, that of Findley a stress.
+POWERS = {"ruiz": (1, 1), "smith_watson_topper": (0, 2), "findley": (0, 1)}
+
+ProbeErrors = dict[str, Numbers]  # by part
+ProbeResults = Callable[[Array, Progress], ProbeErrors]
 
 
-def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str, Errors]:
-    """Return the errors of the main results by interface, each by its sources.
+def error_budget(
+    outcome: Outcome, reporter: Reporter, probe_results: ProbeResults
+) -> dict[str, dict[str, ResultError]]:
+    """Return the errors of the main results by interface, each by its sources."""
+    with reporter.stage("error budget", "probe runs") as progress:
+        probed = probe_results(followed(outcome), progress)
+        contacts = {
+            contact.stage.name: ContactErrors(
+                outcome.case,
+                contact,
+                outcome.source.peak,
+                {part: by_name[contact.stage.name] for part, by_name in probed.items()},
+            )
+            for contact in outcome.interfaces
+        }
+        errors = at_once([partial(errors_of, contact) for contact in contacts.values()])
+        return dict(zip(contacts, errors, strict=True))
 
-    ``begun`` returns the results of the probe runs.
-    """
-    with reporter.stage("error budget", "short lives") as progress:
-        lives = begun(followed(outcome), progress)
-        names = [contact.stage.name for contact in outcome.interfaces]
-        probed = [{part: by_name[name] for part, by_name in lives.items()} for name in names]
-        errors = at_once(
-            [
-                partial(errors_of, outcome.case, contact, outcome.source.peak, told)
-                for contact, told in zip(outcome.interfaces, probed, strict=True)
-            ]
+
+def errors_of(contact: ContactErrors) -> dict[str, ResultError]:
+    """Return the errors of the results of one contact."""
+    parts: dict[str, ErrorByResult] = {}
+    for part in layout.PARTS:
+        if (by_result := PARTS[part].errors(contact)) is not None:
+            parts[part] = by_result
+    results = (*layout.WORN, *layout.PRESSURES)
+    errors = {result: _error(parts, result) for result in results}
+    parameter = contact.case.stress.life.parameter
+    if parameter in POWERS:
+        of_work, of_stress = POWERS[parameter]
+        work, stress = errors["depth"].parts, errors["worn_peak_pressure"].parts
+        errors["life"] = ResultError(
+            {part: _sum(of_work, work[part], of_stress, stress.get(part, 0.0)) for part in work}
         )
-        return dict(zip(names, errors, strict=True))
+    return errors
 
 
-def lives_of_companions(
-    case: WearCase, source: LoadSource, reporter: Reporter, beside: WorkerProcess
-) -> Begun:
+def _error(parts: dict[str, ErrorByResult], result: str) -> ResultError:
+    """Return the error of a result, without the sign of parts whose sign is unknown."""
+    known = {part: by_result[result] for part, by_result in parts.items() if result in by_result}
+    signed = frozenset(part for part in PARTS if result in PARTS[part].signed)
+    return ResultError(
+        {
+            part: value if value is None or part in signed else abs(value)
+            for part, value in known.items()
+        },
+        signed,
+    )
+
+
+def _sum(n: int, first: float | None, m: int, second: float | None) -> float | None:
+    """Return ``n`` times one part plus ``m`` times another, or None if one of them is unknown."""
+    if (n and first is None) or (m and second is None):
+        return None
+    return n * abs(first or 0.0) + m * abs(second or 0.0)
+
+
+def begin_probe_runs(
+    case: WearCase, source: LoadSource, reporter: Reporter, worker: WorkerProcess
+) -> ProbeResults:
     """Return a function for the errors from probe runs, given when the loads followed wear.
 
     Errors are left out if the case requests no probe runs, and for parts whose probe run fails.
@@ -55,41 +99,29 @@ def lives_of_companions(
     """
     if case.error_budget == "known" or case.contact.method == "nodes":
         return lambda *_: {}
-    companions: Companions[Any] = Companions.of(case, structure_of(case).finer(case), source.line)
+    cases: ProbeCases[Any] = ProbeCases.of(case, structure_of(case), source.line)
 
-    def heard(told: Told, shares: Array) -> Lives:
-        lives, rest, failures = told
-        for part, error in failures:
-            reporter.log(f"error budget: {part} unknown, a short life failed: {error}")
-        if "coupling" in lives:
-            lives["coupling"] = scaled(lives["coupling"], late(rest, shares))
-        return lives
+    def reported(probed: Probed, shares: Array) -> ProbeErrors:
+        for part, failure in probed.failures.items():
+            reporter.log(f"error budget: {part} unknown, a probe run failed: {failure}")
+        if "coupling" not in probed.errors:
+            return probed.errors
+        lag, never = late(probed.rate, shares), probed.errors["coupling"]
+        follow = {name: scaled(numbers, lag) for name, numbers in never.items()}
+        return {**probed.errors, "coupling": follow}
 
-    of = case, companions, source if companions.same else None
-    if companions.same and not (source.line and isinstance(source, StructureLoads)):
-        return lambda shares, progress: heard(_lived(*of, progress), shares)
-    answer = beside.begin(_lived, *of)
-    return lambda shares, _: heard(answer(), shares)
+    arguments = case, cases, source if cases.same else None
+    if cases.same and not (source.line and isinstance(source, StructureLoads)):
+        return lambda shares, progress: reported(_probed(*arguments, progress), shares)
+    answer = worker.begin(_probed, *arguments)
+    return lambda shares, _: reported(answer(), shares)
 
 
-def _lived(
-    case: WearCase,
-    companions: Companions[Any],
-    source: LoadSource | None,
-    progress: Progress = unseen,
-) -> Told:
+def _probed(
+    case: WearCase, cases: ProbeCases[Any], source: LoadSource | None, progress: Progress = unseen
+) -> Probed:
     """Return the errors from the probe runs of a case; ``source`` is that of its own structure."""
-    failures: list[tuple[str, str]] = []
-
-    def failed(part: str, error: Exception) -> None:
-        failures.append((part, str(error)))
-
-    try:
-        source_of = structure_of(case).source
-        return *companions.errors(source, source_of, failed, progress), failures
-    except LIFE_FAILURES as error:
-        failed("mesh, grid and coupling", error)
-        return {}, 0.0, failures
+    return cases.probed(source, structure_of(case).source, progress)
 
 
 def followed(outcome: Outcome) -> Array:

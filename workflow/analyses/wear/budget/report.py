@@ -17,7 +17,7 @@ Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
 # become finer.
 AT_EDGES, EDGES = 5.0, ("worn_peak_pressure", "life")
 # Number of parts that a line lists, and the least share of the total for a part to be listed.
-MOST_PARTS, WORTH_TELLING = 2, 0.1
+MOST_PARTS, WORTH_REPORTING = 2, 0.1
 
 
 def summary_of(errors: Mapping[str, ResultError]) -> dict[str, Any]:
@@ -28,8 +28,8 @@ def summary_of(errors: Mapping[str, ResultError]) -> dict[str, Any]:
 def datasets_of(errors: Mapping[str, ResultError]) -> dict[str, Dataset]:
     """Return each result's parts in the order of ``PARTS``, nan if unknown, and their total."""
     what = (
-        f"estimated relative errors by {', '.join(PARTS)}, above 0 where too much is told, and "
-        "their total"
+        f"estimated relative errors by {', '.join(PARTS)}, above 0 where the result is too large, "
+        "and their total"
     )
     return {
         name: Dataset(
@@ -50,14 +50,14 @@ def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
     """
     if not errors:
         return
-    told = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in errors.items())
-    yield f"estimated errors: {told}"
+    listed = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in errors.items())
+    yield f"estimated errors: {listed}"
     worst = max(errors, key=lambda name: errors[name].total)
     error = errors[worst]
     parts = [
         f"{name} {part:{'+' if name in error.signed else ''}.1%}"
         for name, part in error.largest[:MOST_PARTS]
-        if part and abs(part) >= WORTH_TELLING * error.total
+        if part and abs(part) >= WORTH_REPORTING * error.total
     ]
     unknown = dict.fromkeys(name for error in errors.values() for name in error.unknown)
     largest = f"most of {RESULTS[worst]}: {', '.join(parts)}" if parts else ""

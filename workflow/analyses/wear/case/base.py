@@ -95,7 +95,7 @@ class WearCase(WithScans, Case):
         default=0.05,
     )
     error_budget: Literal["probed", "known"] = entry(
-        "probed: short lives on a finer mesh and a coarser grid tell what these leave; known: only "
+        "probed: probe runs on a finer mesh and another grid estimate their errors; known: only "
         "what the run knows of itself",
         "probed",
         default="probed",

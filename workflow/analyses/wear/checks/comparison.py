@@ -51,12 +51,12 @@ def comparison_summary(
     """Return results of the half-space by increment, with the structure's where they are known."""
     half_space = half_space_loads(cycle, structure)
     forces, energies = ("Qx", "Qy", "Mz"), ("Edx", "Edy")
-    told = {*forces, *(energies if slip_known else ())}
+    known = {*forces, *(energies if slip_known else ())}
     return {
         "sliding": half_space.sliding.tolist(),
         **{
             name: {"half_space": getattr(half_space, name).tolist()}
-            | ({"structure": getattr(structure, name).tolist()} if name in told else {})
+            | ({"structure": getattr(structure, name).tolist()} if name in known else {})
             for name in (*forces, *energies)
         },
     }

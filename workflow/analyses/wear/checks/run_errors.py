@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from wear.steps.step_errors import root_mean_square
+from workflow.analyses.wear.approximations.registry import PARTS
 from workflow.analyses.wear.budget.report import Budget, warning_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Duration
 from workflow.analyses.wear.output.outcome import InterfaceOutcome
-from workflow.analyses.wear.structure import SETTINGS
 from workflow.analyses.wear.structures import structure_of
 from workflow.shell.terminal.reporter import Reporter
 
@@ -22,11 +22,12 @@ PEAK = 0.1
 # of 110, 60, 20 and 10 %.
 FEW_INCREMENTS = 32
 
-
 # Factors by which advice shortens steps and drifts, and tightens tolerances. Errors of first order
 # fall to a quarter; the length of automatic steps is about proportional to the root of their
 # tolerance.
 SHORTER, STRICTER = 4.0, 10.0
+# What reduces each part of the error, where the case does not say more.
+REMEDIES = {part.name: part.remedy for part in PARTS.values()}
 
 
 def warn_of_errors(
@@ -44,7 +45,7 @@ def warn_of_errors(
     for contact in contacts:
         name, state, shorter = contact.stage.name, contact.state, shorter_steps(case.wear, contact)
         _warn_of_steps(case.wear, contact, shorter, reporter)
-        settings = {**SETTINGS, **structure_of(case).settings(case), "steps": shorter}
+        settings = {**REMEDIES, **structure_of(case).settings(case), "steps": shorter}
         settings |= _of_link_and_coupling(case, shorter, drift)
         if beyond := warning_of(name, budget[name], case.accuracy, settings):
             reporter.warn(beyond)
@@ -90,30 +91,30 @@ def _of_link_and_coupling(case: WearCase, shorter: str, drift: float) -> dict[st
         "drift": f"coupling.drift: {100.0 * reached:.2g} %" if reached > 0.0 else every,
         "every": shorter,
     }
-    told = {"coupling": settings[coupling.resultants]}
+    advice = {"coupling": settings[coupling.resultants]}
     if case.contact.link == "half_space":
-        told["link"] = "contact.link: corrected"
-    return told
+        advice["link"] = "contact.link: corrected"
+    return advice
 
 
 def _warn_of_steps(
     wear: Duration, contact: InterfaceOutcome, shorter: str, reporter: Reporter
 ) -> None:
-    left, name = contact.step_error, contact.stage.name
-    if left is None:
+    estimate, name = contact.step_error, contact.stage.name
+    if estimate is None:
         return
-    error, asked = max(left["depth"], left["volume"]), wear.tolerance
+    error, allowed = max(estimate["depth"], estimate["volume"]), wear.tolerance
     if wear.depth_tolerance is not None:
         depths = contact.state.surfaces.depths
-        asked = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
-    if wear.step.automatic and error > asked:
+        allowed = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
+    if wear.step.automatic and error > allowed:
         reporter.warn(
             f"{name}: wear steps leave an estimated error of {error:.2%} of depth and volume "
-            f"where {asked:.2%} was asked for (wear.tolerance): take shorter steps ({shorter})"
+            f"where {allowed:.2%} was asked for (wear.tolerance): take shorter steps ({shorter})"
         )
-    if left["pressure"] > PEAK:
+    if estimate["pressure"] > PEAK:
         reporter.warn(
-            f"{name}: wear steps leave an estimated error of {left['pressure']:.0%} of the "
+            f"{name}: wear steps leave an estimated error of {estimate['pressure']:.0%} of the "
             "peak pressure on the worn surfaces, and of what follows from it (fretting life): "
             f"take shorter steps ({shorter})"
         )

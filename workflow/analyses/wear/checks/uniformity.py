@@ -133,15 +133,9 @@ def uniformity(
     apart = y[np.max(deviations, axis=0) > ALIKE]
     reach = float(apart.min()) - 0.5 * stage.grid.pitch[1] if apart.size else half
     mean_load = float(carried.P.mean()) / _middle(carried.P)
+    uniform = reach >= stage.grid.size[0] and abs(mean_load - 1.0) <= ALIKE
     pressure, slip, wear = (float(deviation[inner].max()) for deviation in deviations)
-    return Uniformity(
-        pressure=pressure,
-        slip=slip,
-        wear=wear,
-        share_of_length_within=reach / half,
-        mean_load=mean_load,
-        uniform=reach >= stage.grid.size[0] and abs(mean_load - 1.0) <= ALIKE,
-    )
+    return Uniformity(pressure, slip, wear, reach / half, mean_load, uniform)
 
 
 def _deviation(values: Array) -> Array:

@@ -161,8 +161,8 @@ def warn_of_contact(
             )
         if case.contact.method == "nodes":
             continue  # the grid only shows them
-        if doubt := _energies_apart(source, stage, interface.loads, result):
-            reporter.warn(f"{stage.name}: {doubt}")
+        if warning := _energies_apart(source, stage, interface.loads, result):
+            reporter.warn(f"{stage.name}: {warning}")
         if result.touches_border:
             reporter.warn(stage.border_warning)
         settings, pressure = case.contact_of(stage.name), result.pressure[source.peak]
@@ -175,27 +175,27 @@ def _energies_apart(
     source: LoadSource, stage: FaceContact, loads: LoadHistory, first: FirstContact
 ) -> str:
     """Return the reason why source and half-space differ in energy, or an empty string."""
-    from_file, told = isinstance(source, ResultantsSource), loads.mean_energy
+    from_file, stated = isinstance(source, ResultantsSource), loads.mean_energy
     found, unit = float(first.energy.sum()), "N" if stage.grid.line else "N mm"
-    if abs(found - told) <= ENERGIES_APART * max(found, told):
+    if abs(found - stated) <= ENERGIES_APART * max(found, stated):
         return ""
     if not first.cycle:
         whose = "structure.file" if from_file else "the structure"
         return (
             f"pressure on the grid and slip of {whose} dissipate {found:.3g} {unit} a cycle, "
-            f"{whose} {told:.3g}: its mesh is too coarse for the slip zone, or little slips; "
+            f"{whose} {stated:.3g}: its mesh is too coarse for the slip zone, or little slips; "
             "refine it or use contact.method: full"
         )
-    if from_file and abs(found - told) > NO_ENERGY * _work_of_sliding(stage, loads):
+    if from_file and abs(found - stated) > NO_ENERGY * _work_of_sliding(stage, loads):
         return (
-            f"structure.file says that {told:.3g} {unit} are dissipated a cycle, the half-space "
+            f"structure.file says that {stated:.3g} {unit} are dissipated a cycle, the half-space "
             f"finds {found:.3g} under the same forces, and wears by it: check Edx and Edy (of each "
             "increment alone), friction.coefficient, size and gap of the face, and that the mesh "
             "that they are from is fine enough for the slip zone"
         )
-    if isinstance(source, StructureLoads) and told > found / (1.0 - FULL_APART):
+    if isinstance(source, StructureLoads) and stated > found / (1.0 - FULL_APART):
         return (
-            f"the structure's nodes dissipate {told:.3g} {unit} a cycle, the half-space with its "
+            f"the structure's nodes dissipate {stated:.3g} {unit} a cycle, the half-space with its "
             f"own friction {found:.3g}, and wears by it: the mesh is too coarse for the slip zone; "
             "refine it"
         )

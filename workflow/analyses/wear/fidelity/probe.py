@@ -1,9 +1,8 @@
-"""Cheap probe runs of a joint: depth and volume that its section wears, for the settings of a rung.
+"""Cheap probe runs of a dovetail: depth and volume that its plane section wears.
 
-A probe run is that of the section in plane strain: it solves the structure once, then wears the
-line contact of each flank over all cycles of the run, in a few steps of equal length. All rungs of
-an axis use the same steps, so that the error of the steps, a few per cent of the depth, is nearly
-the same in all of them and cancels in differences.
+A probe run solves the structure of the section once, then wears the line contact of each flank over
+all cycles of the run. All rungs of a ladder use the same few steps, so that the error of the steps,
+a few per cent of the depth, is nearly the same in all of them and cancels in differences.
 """
 
 from __future__ import annotations
@@ -14,15 +13,20 @@ import numpy as np
 
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
+from sa_solver.types import ElasticPair, Grid, LoadHistory, resultant_change
 from wear.contact.contacts import Contacts
 from wear.contact.tractions import acting_slip
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.marching import advance_cycles
 from wear.steps.stepping import SlidingCycle, WearingContact, WearState
-from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortened, worn_by
+from workflow.analyses.wear.approximations.probe_runs import (
+    STEPS,
+    TOLERANCE,
+    Numbers,
+    probe_run,
+    shortened,
+)
 from workflow.analyses.wear.case.sections import ContactSection
-from workflow.analyses.wear.fidelity.estimate import Numbers
 from workflow.analyses.wear.structures.dovetail.case import SIDES, DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import structure_loads
@@ -64,27 +68,27 @@ def _last_structure(case: DovetailCase) -> StructureLoads:
     return structure_loads(case, dovetail_joint)
 
 
-def life(case: DovetailCase) -> Numbers:
+def section_wear(case: DovetailCase) -> Numbers:
     """Return the depth [mm] and the volume per length [mm²] worn from both bodies, by flank.
 
     The loads are those of the unworn structure. Raises the errors of structure and contact, and
     MethodFailed where nothing wears.
     """
-    stages, (*_, end) = live(case, _structure(case))
-    return _wearing(worn_by(stages, end))
+    return _wearing(probe_run(case, _structure(case)).worn)
 
 
-def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
-    """Return a probe run with the structure solved after every step, and the drift of the loads.
+def coupled_wear(case: DovetailCase) -> tuple[Numbers, float]:
+    """Return the wear with the structure solved after every step, and the drift of the loads.
 
     The drift is that of the resultants at the end, as a run measures it.
     """
     structure = _structure(case)
-    stages, (first, *_, end) = live(case, structure, "every")
-    sizes = np.array([stage.grid.size for stage in stages])
-    drifted = structure.probe(Contacts(stages).nodal_depths(end.interfaces))
+    probed = probe_run(case, structure, "every")
+    first, end = probed.states[0], probed.states[-1]
+    sizes = np.array([contact.grid.size for contact in probed.contacts])
+    drifted = structure.probe(Contacts(probed.contacts).nodal_depths(end.interfaces))
     drift = resultant_change(drifted, first.solved_resultants, sizes)
-    return worn_by(stages, end), float(np.abs(drift).max())
+    return probed.worn, float(np.abs(drift).max())
 
 
 def _wearing(numbers: Numbers) -> Numbers:
@@ -94,49 +98,36 @@ def _wearing(numbers: Numbers) -> Numbers:
     return numbers
 
 
-def _worn(depth: Array, grid: Grid) -> dict[str, float]:
-    return {"depth": float(depth.max()), "volume": float(depth.sum()) * grid.cell_area}
-
-
 # --- the profile along the slot -------------------------------------------------------------------
 
 
-def end_life(case: DovetailCase, cells: int) -> Numbers:
+def slot_wear(case: DovetailCase, cells: int) -> Numbers:
     """Return depth and volume of the profile along the slot, as a line contact of ``cells``.
 
-    Per length across the flank, it carries the section's load over the whole slot, and it slides
-    everywhere by the section's mean slip.
+    Per length across the flank, it carries the section's load over the whole slot, without moments,
+    and it slides everywhere by the section's mean slip.
     """
     structure = _structure(case)
     length, width = case.structure.slot_length, case.structure.face_width
     grid = Grid.strips(length, cells)
     contact = NormalContact(HalfSpace(grid, ElasticPair(case.material(1), case.material(2))))
     laws = case.wear_of(1).described(), case.wear_of(2).described()
-    geometry = case.structure.geometry()
+    geometry, cycles = case.structure.geometry(), case.wear.cycles
     numbers = {}
     for face, history in zip(structure.faces, structure.unworn(), strict=True):
-        loads = _along(history.loads, length / width)
-        slip = acting_slip(history.slip, history.loads).mean(axis=1)
+        carried, none = history.loads, np.zeros(len(history.loads))
+        P = length / width * carried.P
+        mix = carried.sliding, carried.share, carried.block
+        loads = LoadHistory(P, *(none,) * 7, *mix)
+        slip = acting_slip(history.slip, carried).mean(axis=1)
         sliding = SlidingCycle(loads, np.multiply.outer(slip, np.ones(grid.shape)))
         gap = geometry.flank_gap(np.zeros_like(grid.x), grid.x, SIDES[face.face.name])
         wearing = WearingContact(contact, laws, case.friction.at(0.0), sliding, TOLERANCE)
-        state = WearState.unworn(np.ascontiguousarray(gap))
-        numbers[face.face.name] = _worn(_worn_away(wearing, state, case.wear.cycles), grid)
+        state, contact_at = WearState.unworn(np.ascontiguousarray(gap)), lambda _, c=wearing: c
+        for _ in range(STEPS):
+            stepper = ImplicitStepper(alone=True)
+            state = advance_cycles(stepper, state, cycles / STEPS, cycles, contact_at).state
+        depth = state.surfaces.depth
+        volume = float(depth.sum()) * grid.cell_area
+        numbers[face.face.name] = {"depth": float(depth.max()), "volume": volume}
     return _wearing(numbers)
-
-
-def _along(loads: LoadHistory, factor: float) -> LoadHistory:
-    """Return the loads of the profile: P of the section times a factor, without moments."""
-    none = np.zeros(len(loads))
-    return LoadHistory(
-        factor * loads.P, *(none,) * 7, loads.sliding, share=loads.share, block=loads.block
-    )
-
-
-def _worn_away(contact: WearingContact, state: WearState, cycles: float) -> Array:
-    """Return the worn depth of both bodies after ``cycles``."""
-    for _ in range(STEPS):
-        step = cycles / STEPS
-        stepper = ImplicitStepper(alone=True)
-        state = advance_cycles(stepper, state, step, cycles, lambda worn: contact).state
-    return state.surfaces.depth

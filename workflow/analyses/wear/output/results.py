@@ -13,7 +13,7 @@ from sa_solver.types import Array, Progress
 from wear.contact.contacts import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.output.datasets import LOADS, pressure_field, traction_fields
-from workflow.analyses.wear.budget.finding import Begun, error_budget
+from workflow.analyses.wear.budget.finding import ProbeResults, error_budget
 from workflow.analyses.wear.budget.report import Budget, datasets_of, sentences, summary_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.checks.comparison import comparison_summary, write_comparison
@@ -80,10 +80,10 @@ class PeakHistory:
         return {"peak_pressure": pressures, "contact_width": widths, "area": self.area[-1]}
 
 
-def write_output(outcome: Outcome, lives: Begun, run: Run[WearCase]) -> None:
+def write_output(outcome: Outcome, probe_results: ProbeResults, run: Run[WearCase]) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished.
 
-    ``lives`` returns the results of the probe runs, which have started already.
+    ``probe_results`` returns the results of the probe runs, which have started already.
     """
     case, source, state = outcome.case, outcome.source, outcome.state
     folder, reporter = run.folder, run.reporter
@@ -97,7 +97,7 @@ def write_output(outcome: Outcome, lives: Begun, run: Run[WearCase]) -> None:
         structure.warn(case.accuracy, reporter)
     with reporter.stage("stress under the contacts", "steps") as told:
         stresses = _stresses(outcome, structure, reporter, told)
-    budget = error_budget(outcome, reporter, lives)
+    budget = error_budget(outcome, reporter, probe_results)
     with reporter.stage("results"):
         recorded, contents = _write_results(outcome, structure, stresses, budget, run)
     run.draw(contents)
@@ -397,4 +397,4 @@ def _lines(outcome: Outcome, summary: dict[str, Any], budget: Budget) -> Iterato
                 f"  {name}: wear has stopped to within {STOPPED:.0%} of depth and volume after "
                 f"{contact.stopped:.3g} cycles"
             )
-        yield from (f"  {name}: {told}" for told in sentences(budget[name]))
+        yield from (f"  {name}: {line}" for line in sentences(budget[name]))

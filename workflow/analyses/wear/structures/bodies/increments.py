@@ -23,7 +23,7 @@ from wear.contact.interface import InterfaceState
 from wear.contact.tractions import CycleTractions
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.contact.load_path import Leg, LineLeg
-from workflow.analyses.wear.choice import Decision, record_of, since
+from workflow.analyses.wear.choice import Decision, record_of
 from workflow.analyses.wear.structures.bodies.case import Stroke, TwoBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.analyses.wear.translation import face_contact
@@ -59,17 +59,12 @@ def choose_parts(case: AnyCase) -> tuple[AnyCase, dict[str, Any] | None]:
         f"cycle, of {accuracy:.2%} allowed (contact.accuracy); the case's own {rows} leave "
         f"{tried[1]:.2%}"
     )
-    (entry, value), *also = _divided(case, parts).items()
     probe = {
         "parts": list(tried),
         "errors": [e if np.isfinite(e) else None for e in tried.values()],
     }
-    seconds = since(begin)
-    decision = Decision(
-        *(entry, value, why, probe, dict(also), accuracy, error, error <= accuracy, seconds)
-    )
-    record = record_of([decision], accuracy, seconds)
-    return _with_parts(case, parts), record
+    decision = Decision(_divided(case, parts), why, accuracy, error, probe)
+    return changed(case, decision.chosen), record_of([decision.timed(begin)], accuracy, begin)
 
 
 def finer_cycles(case: TwoBodiesWearCase, state: InterfaceState) -> list[CycleTractions]:
@@ -128,11 +123,3 @@ def _divided(case: TwoBodiesWearCase, parts: int) -> dict[str, Any]:
         return {"load_path.increments": parts * path.model_dump()["increments"]}
     legs: Sequence[Leg | LineLeg] = path.legs
     return {f"load_path.legs.{n}.increments": parts * leg.increments for n, leg in enumerate(legs)}
-
-
-def _with_parts(case: AnyCase, parts: int) -> AnyCase:
-    path = case.load_path
-    if isinstance(path, Stroke):
-        return changed(case, _divided(case, parts))
-    legs = tuple(changed(leg, {"increments": parts * leg.increments}) for leg in path.legs)
-    return changed(case, {"load_path.legs": legs})

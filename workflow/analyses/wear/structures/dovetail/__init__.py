@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from math import pi, prod
 from typing import TYPE_CHECKING, Any
 
+from workflow.analyses.wear.approximations.approximation import Neighbour
+from workflow.analyses.wear.approximations.ladders import MESH_ORDER, flank_mesh
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import SPECTRA, Finer, WearStructure, memory
+from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.case.changing import changed
 from workflow.shell.memory import Memory
@@ -21,9 +23,6 @@ FIELDS = 12
 # Nodes of both bodies in space, per node of a flank and by their volume; the factor for quadratic
 # elements.
 FLANK_NODES, VOLUME_NODES, QUADRATIC = 40.0, 1.5, 7.0
-# Factor from the difference to a mesh of half the size and second order to the error of the mesh:
-# all of it for first order, Richardson's factor for second order.
-MESH_SHARES = {1: 1.0, 2: 4.0 / 3.0}
 
 
 def _model(case: DovetailCase) -> StructureModel:
@@ -81,28 +80,30 @@ def _warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[s
     return warnings(case, stage, load)
 
 
-def _finer(case: DovetailCase) -> Finer[DovetailCase]:
-    """Return the section on a mesh of half the size and second order, also for a 3D joint.
-
-    The error due to the mesh along the slot is not included.
-    """
+def _section(case: DovetailCase) -> DovetailCase:
+    """Return the section on the mesh of the case; the error along the slot is not included."""
     from workflow.analyses.wear.fidelity.probe import plane_section
 
-    across, along = case.mesh.flank_nodes
-    mesh = {
-        "mesh.flank_nodes": (2 * across - 1, 2 * along - 1),
-        "mesh.size": 0.5 * case.mesh.size,
-        "mesh.order": 2,
-    }
-    section = changed(plane_section(case), {"mesh": case.mesh})
-    return Finer(mesh, MESH_SHARES[case.mesh.order], section)
+    return changed(plane_section(case), {"mesh": case.mesh})
+
+
+def _finer(case: DovetailCase) -> Neighbour:
+    """Return a mesh of half the size and second order.
+
+    The difference is all of the error of a mesh of first order, and is extrapolated for one of
+    second order.
+    """
+    from workflow.analyses.wear.approximations.convergence import share_of_difference
+
+    share = 1.0 if case.mesh.order == 1 else share_of_difference(2.0, MESH_ORDER)
+    return Neighbour({**flank_mesh(case, 2.0), "mesh.order": 2}, share)
 
 
 def _settings(case: DovetailCase) -> dict[str, str]:
     """Return the settings that reduce the errors of mesh and link: elements of half the size."""
-    across, along = case.mesh.flank_nodes
-    nodes = f"mesh.flank_nodes: [{2 * across - 1}, {2 * along - 1}]"
-    finer = f"{nodes} and mesh.size: {0.5 * case.mesh.size:g} mm"
+    mesh = flank_mesh(case, 2.0)
+    nodes = f"mesh.flank_nodes: {list(mesh['mesh.flank_nodes'])}"
+    finer = f"{nodes} and mesh.size: {mesh['mesh.size']:g} mm"
     return {"link": nodes, "mesh": "mesh.order: 2" if case.mesh.order == 1 else finer}
 
 
@@ -114,6 +115,7 @@ STRUCTURE = WearStructure(
     memory=_memory,
     choose=_choose,
     warnings=_warnings,
+    section=_section,
     finer=_finer,
     settings=_settings,
 )

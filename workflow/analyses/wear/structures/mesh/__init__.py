@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from workflow.analyses.wear.approximations.approximation import Neighbour
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
 from workflow.analyses.wear.structure import (
     DENSE_MATRICES,
-    Finer,
     WearStructure,
     memory,
 )
@@ -44,11 +44,11 @@ def _extent(case: MeshCase) -> Extent:
     )
 
 
-def _finer(case: MeshCase) -> Finer[MeshCase] | None:
+def _finer(case: MeshCase) -> Neighbour | None:
     """Return the mesh with second-order elements, if it has first-order ones and is small."""
     mesh = case.structure.mesh(case.mesh.size)
     cheap = mesh.interfaces[0].line or mesh.node_count(1) <= MOST_NODES
-    return Finer({"mesh.order": 2}) if case.mesh.order == 1 and cheap else None
+    return Neighbour({"mesh.order": 2}) if case.mesh.order == 1 and cheap else None
 
 
 def _memory(case: MeshCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:

@@ -6,8 +6,8 @@ so that their difference is the effect of this setting.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any, Literal
 
@@ -27,18 +27,54 @@ from workflow.errors import MethodFailed, UserError
 from workflow.models.contact import FaceContact
 from workflow.models.loads import LoadSource
 
-Worn = dict[str, dict[str, float]]  # by interface and quantity
-Lived = tuple[list[FaceContact], list[CoupledState]]
+Numbers = dict[str, dict[str, float]]  # by interface and quantity
 
 # Errors that may end a probe run.
 FAILURES = (MeshError, NormalContactError, ContactFailure, MethodFailed)
 # Errors that may end a probe run of a case that is not checked yet.
-LIFE_FAILURES = (*FAILURES, MotionError, UserError)
+UNCHECKED_FAILURES = (*FAILURES, MotionError, UserError)
 # Number of implicit steps. On the default joint, 3 and 8 steps give the same errors of increments
 # and meshes within 2 %, and of grids within 20 % of these errors.
 STEPS = 3
 # Tolerance of the contact solver: a thousandth of the differences that probe runs resolve.
 TOLERANCE = 1e-5
+# An interface that carries, dissipates or wears less than this share of the largest is measured
+# relative to that share.
+LESSER_INTERFACE = 0.1
+
+
+@dataclass(frozen=True)
+class ProbeRun:
+    """Contacts of a probe run, and its states from the unworn one to the last."""
+
+    contacts: list[FaceContact]
+    states: list[CoupledState]
+
+    @property
+    def worn(self) -> Numbers:
+        """Largest depth [mm] and volume [mm³, per length mm²] of both bodies, by interface."""
+        depths = [interface.surfaces.depth for interface in self.states[-1].interfaces]
+        return {
+            contact.name: {"depth": float(depth.max()), "volume": contact.volume(depth)}
+            for contact, depth in zip(self.contacts, depths, strict=True)
+        }
+
+    @property
+    def worn_and_pressed(self) -> Numbers:
+        """Results of :attr:`worn`, and the largest pressures unworn and worn [MPa]."""
+        unworn, worn = (_largest_pressures(self.states[number]) for number in (0, -1))
+        return {
+            name: numbers | {"peak_pressure": first, "worn_peak_pressure": last}
+            for (name, numbers), first, last in zip(self.worn.items(), unworn, worn, strict=True)
+        }
+
+
+def _largest_pressures(state: CoupledState) -> list[float]:
+    """Return the largest pressure in the cycle of each interface [MPa]."""
+    return [
+        max((start.pressure.max() for start in interface.starts.values()), default=0.0)
+        for interface in state.interfaces
+    ]
 
 
 def shortened(case: AnyWearCase, settings: Mapping[str, Any]) -> AnyWearCase:
@@ -55,13 +91,13 @@ def shortened(case: AnyWearCase, settings: Mapping[str, Any]) -> AnyWearCase:
     )
 
 
-def live(
+def probe_run(
     case: WearCase,
     source: LoadSource,
     resultants: Literal["constant", "every"] = "constant",
-    begun: Lived | None = None,
-) -> Lived:
-    """Return the contacts of a probe run and its states, the unworn one first.
+    begun: ProbeRun | None = None,
+) -> ProbeRun:
+    """Run a case that is :func:`shortened`.
 
     With ``begun``, it starts from the unworn state of that run and with its contacts. Raises one of
     :data:`FAILURES` if structure or contacts fail.
@@ -70,20 +106,24 @@ def live(
         # The error of its steps and the loads on its last surfaces are not needed.
         stages = [face_contact(case, face, ImplicitStepper(alone=True)) for face in source.faces]
     else:
-        stages = begun[0]
+        stages = begun.contacts
     cycles, contacts = case.wear.cycles, Contacts(stages)
     settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)
     loop = CoupledWear(settings, source, contacts)
-    state = loop.begin(source.unworn())[0] if begun is None else begun[1][0]
+    state = loop.begin(source.unworn())[0] if begun is None else begun.states[0]
     states = [state, *islice(loop.march(state), STEPS - 1)]
     last = CoupledWear(replace(settings, resultants="constant"), source, contacts)
-    return stages, [*states, *last.march(states[-1])]
+    return ProbeRun(stages, [*states, *last.march(states[-1])])
 
 
-def worn_by(stages: Sequence[FaceContact], state: CoupledState) -> Worn:
-    """Return the largest depth [mm] and the volume [mm³, per length mm²] of both bodies."""
-    depths = [interface.surfaces.depth for interface in state.interfaces]
+def scales(values: Numbers) -> Numbers:
+    """Return the values that errors of each interface are relative to."""
+    names = next(iter(values.values()))
+    largest = {name: max(abs(quantities[name]) for quantities in values.values()) for name in names}
     return {
-        stage.name: {"depth": float(depth.max()), "volume": stage.volume(depth)}
-        for stage, depth in zip(stages, depths, strict=True)
+        interface: {
+            name: max(abs(value), LESSER_INTERFACE * largest[name])
+            for name, value in quantities.items()
+        }
+        for interface, quantities in values.items()
     }

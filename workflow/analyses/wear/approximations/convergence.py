@@ -1,4 +1,4 @@
-"""Error estimate for the finest of a series of refined solutions (Richardson extrapolation)."""
+"""Error estimates from solutions of different fineness (Richardson extrapolation)."""
 
 from __future__ import annotations
 
@@ -23,6 +23,15 @@ class Convergence:
 
     order: float | None
     error: float
+
+
+def share_of_difference(refinement: float, order: float) -> float:
+    """Return the error of a solution, relative to its difference from a refined one.
+
+    ``refinement`` is the ratio of their steps, below 1 for comparison with a coarser solution, and
+    ``order`` their order of convergence.
+    """
+    return 1.0 / (1.0 - refinement**-order)
 
 
 def richardson(
