@@ -113,10 +113,7 @@ ENTRIES = {
         np.array([8.0, 16.0]),
         lambda f: np.array(rayleigh_factors(f, [0.0625, 0.125])),
     ),
-    "span": (
-        np.array([2.0, 2.5]),
-        lambda span: along_frequency(problem(), 1.0, span).frequencies,
-    ),
+    "span": (np.array([2.0, 2.5]), lambda span: along_frequency(problem(), 1.0, span).frequencies),
     "output": (
         FORCE,
         lambda out: (

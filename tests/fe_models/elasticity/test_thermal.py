@@ -7,11 +7,7 @@ from skfem import MeshTet, MeshTri
 from fe_models.elasticity.body import ElasticBody
 from fe_models.elasticity.relinearised import relinearised
 from fe_models.elasticity.stress import cycle_stress, stress_field
-from fe_models.elasticity.thermal import (
-    NodalTemperature,
-    TemperatureChange,
-    thermal_gradient,
-)
+from fe_models.elasticity.thermal import NodalTemperature, TemperatureChange, thermal_gradient
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import (
     ContactPair,

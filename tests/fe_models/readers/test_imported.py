@@ -220,9 +220,7 @@ def test_med_groups_go_by_their_names(tmp_path):
     mesh = meshio.Mesh(
         mesh.points,
         {kind: mesh.get_cells_type(kind) for kind in ("tetra", "triangle")},
-        cell_data={
-            "cell_tags": [np.concatenate(tags[:2]), np.concatenate(tags[2:])],
-        },
+        cell_data={"cell_tags": [np.concatenate(tags[:2]), np.concatenate(tags[2:])]},
     )
     mesh.cell_tags = {-tag: [name] for name, (tag, _) in TAGS.items()}
     mesh.point_data["point_tags"] = np.where(mesh.points[:, 2] == 1.0, 1, 0)

@@ -6,12 +6,7 @@ from skfem import MeshTet, MeshTri
 
 from fe_models import structure
 from fe_models.elasticity.body import ElasticBody
-from fe_models.imported_structure import (
-    ContactPair,
-    Support,
-    imported_mesh,
-    imported_structure,
-)
+from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
 from fe_models.joints import friction
 from fe_models.joints.friction import FrictionalJoint
 from fe_models.loads.applied_loads import (

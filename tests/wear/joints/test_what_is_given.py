@@ -60,18 +60,9 @@ ENTRIES = {
     "spring": (LOADS, lambda k: marched(PolynomialSpring(k))),
     "stop": (1e-4 * LOADS, lambda gap: marched(ElasticStop(1e4, gap))),
     "worn": (1e-5 * LOADS, lambda d: marched(FrictionContact(1e4, 2e4, 0.5, 100.0).worn(d))),
-    "several": (
-        LOADS,
-        lambda load: marched(MixedLaw([JointGroup(Jenkins(1e4, 0.5, load), 2)])),
-    ),
-    "path": (
-        STEPS,
-        lambda u: march_joints(SLIDER, SLIDER.rest(2), np.zeros((2, 1)), u).dissipated,
-    ),
-    "begin": (
-        STEPS[0],
-        lambda u: march_joints(SLIDER, SLIDER.rest(2), u, STEPS).force,
-    ),
+    "several": (LOADS, lambda load: marched(MixedLaw([JointGroup(Jenkins(1e4, 0.5, load), 2)]))),
+    "path": (STEPS, lambda u: march_joints(SLIDER, SLIDER.rest(2), np.zeros((2, 1)), u).dissipated),
+    "begin": (STEPS[0], lambda u: march_joints(SLIDER, SLIDER.rest(2), u, STEPS).force),
     "increment": (STEPS[0], lambda u: SLIDER.respond(SLIDER.rest(2), u).force),
     "state": (
         np.array([[0.01, 0.002], [0.02, 0.001]]),
@@ -111,10 +102,7 @@ ENTRIES = {
     "exponential": (ENERGIES, ExponentialEvolution(0.5, -1e-6)),
     "table": (ENERGIES, TabulatedEvolution((0.0, 1e6), (0.5, 0.7))),
     "places of a table": (ENERGIES, lambda e: TabulatedEvolution(e, (1.0, 2.0, 3.0))(2e6)),
-    "evolution": (
-        ENERGIES,
-        lambda e: JointEvolution(friction=RISING).at(SLIDER, e).friction,
-    ),
+    "evolution": (ENERGIES, lambda e: JointEvolution(friction=RISING).at(SLIDER, e).friction),
     "cycles": (ENERGIES, TEST.energy_at),
     "energies": (ENERGIES, TEST.cycles_at),
     "breaks": (ENERGIES, lambda b: long_test(lambda e: 1.0, 100.0, breaks=b).energy),

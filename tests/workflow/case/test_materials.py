@@ -67,10 +67,7 @@ def test_the_case_of_a_run_says_name_and_numbers(dovetail_path):
 
 def test_a_check_says_name_and_numbers(dovetail_path):
     outline = load_case(dovetail_path, ["materials.disk=100Cr6"]).outline()
-    assert (
-        "material",
-        "disk: 100Cr6, young 210 GPa, poisson 0.3, density 7830 kg/m³",
-    ) in outline
+    assert ("material", "disk: 100Cr6, young 210 GPa, poisson 0.3, density 7830 kg/m³") in outline
 
 
 def test_a_contact_takes_what_it_needs():

@@ -209,12 +209,7 @@ class MadeUp:
 
 
 def made_up(
-    monkeypatch: pytest.MonkeyPatch,
-    case: Path,
-    out: Path,
-    *,
-    limit: float = 1e3,
-    **settings: Any,
+    monkeypatch: pytest.MonkeyPatch, case: Path, out: Path, *, limit: float = 1e3, **settings: Any
 ) -> tuple[MadeUp, dict[str, Ladder]]:
     """Return the ladders of artificial runs, by axis."""
     runs = MadeUp(limit)

@@ -212,8 +212,7 @@ def test_wrong_path_file_is_told_with_both_lines(tmp_path, content, line, words)
 
 
 @pytest.mark.parametrize(
-    ("content", "words"),
-    [("Qx\n1\n", "neither P nor approach"), ("P,approach\n1,0\n", "beside P")],
+    ("content", "words"), [("Qx\n1\n", "neither P nor approach"), ("P,approach\n1,0\n", "beside P")]
 )
 def test_columns_of_a_path_file_must_agree(tmp_path, content, words):
     (tmp_path / "history.csv").write_text(content, encoding="utf-8")

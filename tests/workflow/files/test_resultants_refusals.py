@@ -8,20 +8,10 @@ import numpy as np
 import pytest
 
 from sa_solver.types import LoadHistory
-from tests.workflow.contact_loads import (
-    COLUMNS,
-    FRICTION,
-    GOOD,
-    SIZE,
-    face_history,
-    table,
-    write,
-)
+from tests.workflow.contact_loads import COLUMNS, FRICTION, GOOD, SIZE, face_history, table, write
 from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
-from workflow.analyses.wear.structures.resultants.writing import (
-    write_resultants_h5,
-)
+from workflow.analyses.wear.structures.resultants.writing import write_resultants_h5
 from workflow.case.files.input_files import InputFileError
 
 

@@ -302,10 +302,7 @@ def test_memory_grows_with_the_body(specimen):
     [
         ("excitation.mass=1", "given beside a reduced body; allowed: structure.driven"),
         ("structure.body=1", "given beside a single body"),
-        (
-            "structure.joints=[]",
-            "a list of at least 1, with points, direction below it",
-        ),
+        ("structure.joints=[]", "a list of at least 1, with points, direction below it"),
         ("structure.joints.0.direction=w", "'x', 'y', 'z'"),
         ("joint.gap=1 um", "given beside a normal load"),
     ],

@@ -302,7 +302,7 @@ class TestCase:
         assert isinstance(case, SpecimensCase)
         assert parse_case(dump_case(case), "again.yaml") == case
         assert [name for name, _ in case.outline()] == [
-            *("structure", "load path", "material", "friction", "contact", "wear law", "wear"),
+            *("structure", "load path", "material", "friction", "contact", "wear law", "wear")
         ]
 
     @pytest.mark.parametrize("name", ["specimens_flat", "specimens_curved"])
@@ -341,10 +341,7 @@ class TestCase:
     @pytest.mark.parametrize(
         ("overrides", "message"),
         [
-            (
-                ["wear.step.cycles=1e7"],
-                "wear.step.cycles: steps of 1e+07 cycles",
-            ),
+            (["wear.step.cycles=1e7"], "wear.step.cycles: steps of 1e+07 cycles"),
             (["wear.step.cycles=1"], "more than 20000 cycle blocks"),
             (["load_path.stroke=1e-9 mm"], "nothing slides at 87 N"),
             (["load_path.normal_forces.1=1e-6 N"], "a single node of the pad touches"),

@@ -88,10 +88,7 @@ def test_a_forecast_is_told_once_and_again_where_it_changes(clock: Clock, tmp_pa
             reporter.reached(step / 10.0, f"step {step}")
     told = [line[9:] for line in (tmp_path / "log").read_text().splitlines()]
     # 9 steps of 60 s and 30 s; after the seventh 3 of 150 s and 30 s, 1440 s in place of 630.
-    assert told == [
-        "wear, step 1: about 10 min to go",
-        "wear, step 7: about 8 min to go",
-    ]
+    assert told == ["wear, step 1: about 10 min to go", "wear, step 7: about 8 min to go"]
 
 
 def test_short_runs_are_not_forecast(clock: Clock, tmp_path: Path) -> None:

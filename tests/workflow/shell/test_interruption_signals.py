@@ -17,10 +17,7 @@ from workflow.analyses.wear import contact_workers
 from workflow.shell import processes as workers
 
 # Many quick jumps, so that a random moment mostly falls among them.
-MANY = (
-    *("wear.step.cycles=1500", "coupling.drift=2e-4"),
-    "load_path.increments=[5, 7]",
-)
+MANY = (*("wear.step.cycles=1500", "coupling.drift=2e-4"), "load_path.increments=[5, 7]")
 JUMPS = 20
 # Seconds a run of these needs; kills come at any moment of it, and some too late.
 RUN_SECONDS = 6.0

@@ -97,16 +97,10 @@ RUNS = {
     # Short lives beside it are of runs in processes alone: those of the tests go without.
     "wear": LongRun(
         BALL,
-        (
-            "wear.step={kind: implicit, cycles: 100}",
-            "contact.grid=[48, 48]",
-            "error_budget=known",
-        ),
+        ("wear.step={kind: implicit, cycles: 100}", "contact.grid=[48, 48]", "error_budget=known"),
     ),
     "body wear": LongRun(
-        BODY,
-        (IN_TEXT, "wear.frequency=", "wear.at_resonance=true", "wear.force=20 N"),
-        as_texts(),
+        BODY, (IN_TEXT, "wear.frequency=", "wear.at_resonance=true", "wear.force=20 N"), as_texts()
     ),
     "pad wear": LongRun(PADS_THAT_WEAR, ("forces=[20 N]",), (("specimens.yaml", SPECIMENS),)),
 }

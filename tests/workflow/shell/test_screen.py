@@ -117,9 +117,7 @@ def test_a_narrow_terminal_tells_how_far_it_is_and_no_more(terminal: Callable[[]
     assert "condensation" in line
 
 
-def test_a_terminal_that_only_prints_is_told_by_lines(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_terminal_that_only_prints_is_told_by_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     for kind, shows_rows in {"dumb": False, "xterm": True}.items():
         console = Console(file=io.StringIO(), force_terminal=True, _environ={"TERM": kind})
         monkeypatch.setattr(screen, "console", lambda console=console: console)

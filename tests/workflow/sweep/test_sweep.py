@@ -77,7 +77,7 @@ design: zip
 """
     design = runs(tmp_path, text)
     assert [tuple(run.values.values()) for run in design] == [
-        *((2, (16, 16)), (6, (32, 16)), (10, (32, 32))),
+        *((2, (16, 16)), (6, (32, 16)), (10, (32, 32)))
     ]
     sweep_file = load_sweep(tmp_path / "sweep.yaml")
     case = design[1].job(sweep_file).load()

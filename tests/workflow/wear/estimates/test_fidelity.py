@@ -13,13 +13,7 @@ from workflow.analyses.wear.case.sections import Coupling, Step
 from workflow.analyses.wear.choice import Decision
 from workflow.analyses.wear.fidelity import axes, choosing
 from workflow.analyses.wear.fidelity.estimate import estimate
-from workflow.analyses.wear.fidelity.probe import (
-    STEPS,
-    coupled_life,
-    end_life,
-    life,
-    plane_section,
-)
+from workflow.analyses.wear.fidelity.probe import STEPS, coupled_life, end_life, life, plane_section
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed

@@ -18,8 +18,7 @@ pytestmark = [pytest.mark.usefixtures("reads_here")]
 
 
 @pytest.mark.parametrize(
-    ("dimension", "order", "rel"),
-    [(2, 2, 0.015), pytest.param(3, 0, 0.03, marks=pytest.mark.slow)],
+    ("dimension", "order", "rel"), [(2, 2, 0.015), pytest.param(3, 0, 0.03, marks=pytest.mark.slow)]
 )
 def test_hertz_of_curved_elements(tmp_path, dimension: int, order: int, rel: float):
     """A second-order mesh and a CAD file give Hertz; in space four nodes carry the load."""

@@ -129,22 +129,13 @@ def test_check_tells_bodies_and_terms(strips):
 @pytest.mark.parametrize(
     ("overrides", "wrong"),
     [
-        (
-            ["structure.contacts.0.bodies=[base, shimm]"],
-            "no body shimm; allowed: base, pad, shim",
-        ),
-        (
-            ["structure.contacts.0.bodies=[base, base]"],
-            "the same body twice",
-        ),
+        (["structure.contacts.0.bodies=[base, shimm]"], "no body shimm; allowed: base, pad, shim"),
+        (["structure.contacts.0.bodies=[base, base]"], "the same body twice"),
         (
             ["structure.contacts.1.bodies=[base, pad]", "structure.contacts.0.bodies=[base, pad]"],
             "structure.other_bodies.0.name: shim: in no contact",
         ),
-        (
-            ["structure.other_bodies.0.name=pad"],
-            "pad twice",
-        ),
+        (["structure.other_bodies.0.name=pad"], "pad twice"),
         (
             ["structure.contacts.0.face_1=shim_above"],
             "boundary shim_above is on body shim, not on base",

@@ -20,20 +20,13 @@ from wear.contact.tractions import CycleTractions
 from wear.cracking.bulk_stress import BulkStress
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.stress.body_stress import Planes, StressedBody, StressedCycle
-from workflow.analyses.wear.stress.contact_stress import (
-    _report_carried,
-    _report_stick,
-    life_maps,
-)
+from workflow.analyses.wear.stress.contact_stress import _report_carried, _report_stick, life_maps
 from workflow.shell.output.results import grid_of
 
 FLANKS = ("intrados", "extrados")
 BODIES = {1: "disk", 2: "blade"}
 METAL = Material(115e3, 0.29)
-QUICK = (
-    *("contact.grid=[24, 32]", "wear.cycles=1e4"),
-    "stress={points: 6}",
-)
+QUICK = (*("contact.grid=[24, 32]", "wear.cycles=1e4"), "stress={points: 6}")
 # Of the pressures of one contact problem solved from two different starts.
 SOLVER = 1e-6
 
