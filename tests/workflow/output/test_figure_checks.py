@@ -89,13 +89,7 @@ def many(path: Path, shape: tuple[int, int]) -> Path:
     ],
     ids=["slot", "square", "wide and long names", "five"],
 )
-def test_figures_of_wear(
-    size: tuple[float, float],
-    names: tuple[str, ...],
-    shape: tuple[int, int],
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
+def test_figures_of_wear(size, names, shape, monkeypatch, tmp_path):
     path, contents = scene(monkeypatch, tmp_path / "results.h5", size, names, shape)
     drawn = figures_of(contents)
     # Those of many faces take long.

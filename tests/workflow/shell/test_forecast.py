@@ -112,9 +112,7 @@ def test_a_first_step_may_be_loading(clock: Clock, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("rate", "told"), [(1e-5, "3 min"), (5e-2, "40 s")])
-def test_of_little_work_it_is_told_what_was_expected(
-    clock: Clock, tmp_path: Path, rate: float, told: str
-) -> None:
+def test_of_little_work_it_is_told_what_was_expected(clock, tmp_path, rate, told):
     """200 s are expected: 2e-5 of the work in 2 s (28 h) counts little, a tenth in 20 s a lot."""
     reporter = Reporter(tmp_path / "log", expected=RunTime(course=200.0, after=0.0))
     with reporter.course("motions"):
@@ -172,9 +170,7 @@ SHORT = ["output.figures=false", "output.paraview=false"]
         slow("specimens_coarse.yaml", [], r"specimens, [\d.]+ N"),
     ],
 )
-def test_runs_of_every_kind_tell_how_far_they_are(
-    every_step: None, tmp_path: Path, name: str, settings: list[str], told: str
-) -> None:
+def test_runs_of_every_kind_tell_how_far_they_are(every_step, tmp_path, name, settings, told):
     out = tmp_path / "out"
     settings = [*settings, *(SHORT if "paraview" in (CASES / name).read_text() else SHORT[:1])]
     done = command("run", CASES / name, "--out", out, overrides=settings)

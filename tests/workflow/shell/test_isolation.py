@@ -116,9 +116,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
 
 
 @pytest.mark.parametrize("what", FAILURES)
-def test_what_only_shows_a_run_fails_and_the_run_does_not(
-    what: str, whole: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_only_shows_a_run_fails_and_the_run_does_not(what, whole, tmp_path, monkeypatch):
     """Results equal those of a run without failures, and one warning names what is missing."""
     folder, summary = whole
     said, fail = FAILURES[what]

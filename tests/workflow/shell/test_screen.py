@@ -41,9 +41,7 @@ def without_times(lines: list[str]) -> list[str]:
         (Loudness.VERBOSE, ["a line", "a detail", "warning: too coarse", "mesh: ... s"]),
     ],
 )
-def test_the_log_has_all_however_quiet_it_is(
-    loudness: Loudness, heard: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_log_has_all_however_quiet_it_is(loudness, heard, tmp_path, capsys):
     said_by(Reporter(tmp_path / "log", loudness=loudness))
     assert without_times(capsys.readouterr().err.splitlines()) == heard
     logged = [line[9:] for line in (tmp_path / "log").read_text("utf-8").splitlines()]
@@ -69,9 +67,7 @@ def terminal(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     return shown.getvalue
 
 
-def test_a_stage_shows_how_far_it_is(
-    terminal: Callable[[], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stage_shows_how_far_it_is(terminal, tmp_path, monkeypatch):
     monkeypatch.setattr("workflow.shell.terminal.reporter.LOOK", -1.0)
     reporter = Reporter(tmp_path / "log")
     with reporter.stage("condensation", "bodies") as told:
@@ -83,9 +79,7 @@ def test_a_stage_shows_how_far_it_is(
     assert "more" in row
 
 
-def test_a_long_part_is_forecast_before_any_of_it_is_done(
-    terminal: Callable[[], str], tmp_path: Path
-) -> None:
+def test_a_long_part_is_forecast_before_any_of_it_is_done(terminal, tmp_path):
     """5 min of wear and 1 min after it are expected, scaled as the start took longer."""
     reporter = Reporter(tmp_path / "log", expected=RunTime(course=300.0, after=60.0))
     with reporter.course("wear"):
@@ -124,9 +118,7 @@ def test_a_terminal_that_only_prints_is_told_by_lines(monkeypatch: pytest.Monkey
         assert screen.Screen(on=True).on is shows_rows
 
 
-def test_where_there_is_no_terminal_a_line_now_and_then(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_where_there_is_no_terminal_a_line_now_and_then(tmp_path, monkeypatch, capsys):
     """1000 nodes in ten minutes give ten lines."""
     now = [100.0]
     monkeypatch.setattr("time.perf_counter", lambda: now[0])
@@ -176,9 +168,7 @@ def test_without_arguments_it_says_what_to_try() -> None:
 
 
 @slow
-def test_what_it_says_to_try_works_and_leaves_a_picture(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_it_says_to_try_works_and_leaves_a_picture(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for arguments in to_try():
         assert CliRunner().invoke(cli, arguments).exit_code == 0, arguments

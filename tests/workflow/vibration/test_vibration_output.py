@@ -200,9 +200,7 @@ def test_titles_fit_the_width(results: h5py.File) -> None:
                 assert box.x1 <= figure.bbox.x1, text.get_text()
 
 
-def test_responses_are_named_after_what_is_seen(
-    results: h5py.File, summary: dict[str, Any]
-) -> None:
+def test_responses_are_named_after_what_is_seen(results, summary):
     axis, phase = vibration.frequency_response(results, CONTENTS).axes
     assert axis.get_ylabel() == "amplitude of block x / force [µm/N]"
     lines = {str(line.get_label()): line for line in axis.lines}

@@ -110,24 +110,6 @@ def uncommented(line: str) -> str:
     return line
 
 
-def test_template_works_without_its_comment_signs(tmp_path):
-    """Entries about single interfaces, their frames and nodes are valid as well."""
-    one = [line for line in TABLE.splitlines() if not line.startswith(("late", "never"))]
-    text = "\n".join(one).replace("early", "interface")
-    (tmp_path / "loads.csv").write_text(text, encoding="utf-8")
-    for number in (1, 2):
-        write_nodes(tmp_path / f"nodes_{number}.csv", np.linspace(-5, 5, 4), np.linspace(-9, 9, 4))
-    np.save(tmp_path / "disk.npy", np.zeros((560, 3010), dtype=np.int8))
-    head, rest = template("resultants").split("  # interfaces:")
-    interfaces, tail = rest.split("\n\n", 1)
-    lines = [uncommented(line) for line in interfaces.splitlines()[1:]]
-    case = "\n".join([f"{head}  interfaces:", *lines, tail])
-    (interface,) = parse_case(case, str(tmp_path / "case.yaml")).structure.interfaces
-    assert interface.frame is not None
-    assert interface.nodes is not None
-    assert interface.nodes.body_2 == str(tmp_path / "nodes_2.csv")
-
-
 @pytest.mark.parametrize(
     ("override", "place", "words"),
     [

@@ -67,9 +67,7 @@ def peak_traction(file: h5py.File, flank: str, moment: str) -> Array:
 
 @pytest.mark.parametrize("method", ["normal", slow("full"), "line"])
 @pytest.mark.parametrize("moment", ["unworn", "worn"])
-def test_section_is_that_of_the_recorded_tractions_and_of_the_structure(
-    request: pytest.FixtureRequest, method: str, moment: str
-) -> None:
+def test_section_is_that_of_the_recorded_tractions_and_of_the_structure(request, method, moment):
     """Stress that the structure carries past the contact pulls along its free face."""
     run = request.getfixturevalue(method)
     with h5py.File(run.folder / "results.h5") as file:
@@ -143,9 +141,7 @@ def test_wear_takes_the_peaks_off(normal: Any) -> None:
 
 
 @pytest.mark.parametrize("method", ["normal", slow("full"), "line"])
-def test_friction_parameter_integrates_to_the_energy_of_the_cycle(
-    request: pytest.FixtureRequest, method: str
-) -> None:
+def test_friction_parameter_integrates_to_the_energy_of_the_cycle(request, method):
     run = request.getfixturevalue(method)
     with h5py.File(run.folder / "results.h5") as file:
         for flank in FLANKS:
@@ -301,9 +297,7 @@ def test_switched_off_it_leaves_nothing(start: Any, tmp_path: Path) -> None:
     ],
     ids=["off the grid", "no depth", "line along y"],
 )
-def test_sections_that_cannot_be_are_refused(
-    start: Any, tmp_path: Path, overrides: list[str], words: str
-) -> None:
+def test_sections_that_cannot_be_are_refused(start, tmp_path, overrides, words):
     run = start(tmp_path / "out", *QUICK, *overrides)
     assert run.ending.exit_code == 2
     assert words in " ".join(run.ending.stderr.split())
