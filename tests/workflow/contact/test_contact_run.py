@@ -109,16 +109,6 @@ def test_increment_that_does_not_converge_ends_the_run_and_keeps_the_others(
     assert invoke("resume", out).exit_code == 0
 
 
-def test_border_and_yield_are_warned_of(solver, small, tmp_path):
-    solver(states(12, border_load=0.01, traction=np.full((3, 32, 32), 950.0)))
-    done = invoke("run", small, "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.stderr
-    border, pressure = summary_of(tmp_path / "out")["warnings"]
-    assert "touches the border" in border
-    assert "raise contact.size" in border
-    assert "reaches 950 MPa, above the yield stress of 900 MPa" in pressure
-
-
 UNLIKE = """\
 title: Rigid ball on rubber
 analysis: contact

@@ -458,12 +458,7 @@ def test_a_case_is_written_as_it_was_read_and_outlined(text, tmp_path):
     [
         ("structure.kind=joint", "allowed: rig, friction_rig, reduced, matrices"),
         ("joint.law=jenkins", "friction_contact"),
-        ("joint.gap=1 um", "unknown key"),
-        ("mass=1", "unknown key"),
-        ("joint.normal_load=0", "above 0"),
         ("contact={file: specimens.yaml}", "unknown key"),
-        ("wear.cycles=[10, 10]", "not ascending"),
-        ("wear.tolerance=0", "0.01 % to 50 %"),
         ("structure.specimens=nothing.yaml", "no such file"),
     ],
 )

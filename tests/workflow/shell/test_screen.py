@@ -15,7 +15,6 @@ from tests.marks import slow
 from workflow.cli import TO_TRY, cli
 from workflow.commands.group import LISTED
 from workflow.runs.first_look import first_look
-from workflow.shell.run_time import RunTime
 from workflow.shell.terminal import screen
 from workflow.shell.terminal.reporter import LINE, Reporter
 from workflow.shell.terminal.screen import Loudness
@@ -79,15 +78,6 @@ def test_a_stage_shows_how_far_it_is(terminal, tmp_path, monkeypatch):
     assert "more" in row
 
 
-def test_a_long_part_is_forecast_before_any_of_it_is_done(terminal, tmp_path):
-    """5 min of wear and 1 min after it are expected, scaled as the start took longer."""
-    reporter = Reporter(tmp_path / "log", expected=RunTime(course=300.0, after=60.0))
-    with reporter.course("wear"):
-        reporter._screen._rows.refresh()
-    reporter.close()
-    assert "about 6 min to go" in terminal()
-
-
 def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_path: Path) -> None:
     """The remaining time is shown in full, and the progress text is cut."""
     shown = screen.Screen(on=True)
@@ -97,18 +87,6 @@ def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_p
     shown.close()
     assert "about 20 min to go" in terminal()
     assert "…" in terminal()
-
-
-@pytest.mark.parametrize("terminal", [40], indirect=True)
-def test_a_narrow_terminal_tells_how_far_it_is_and_no_more(terminal: Callable[[], str]) -> None:
-    """In 40 columns a bar and a forecast would leave no room for it."""
-    rows = screen.Screen(on=True)
-    with rows.row("condensation") as row:
-        row.show(0.4, "2 of 5 steps", "about 20 min more")
-        rows._rows.refresh()
-    rows.close()
-    (line,) = {line for line in terminal().splitlines() if "2 of 5 steps" in line}
-    assert "condensation" in line
 
 
 def test_a_terminal_that_only_prints_is_told_by_lines(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,10 +126,6 @@ def test_a_run_tells_where_to_look_first(tmp_path: Path) -> None:
         f"  figure    {tmp_path}/figures/maps.svg",
         f"  ParaView  paraview --script={tmp_path}/paraview/view.py",
     ]
-
-
-def test_a_run_without_pictures_tells_its_folder(tmp_path: Path) -> None:
-    assert list(first_look(tmp_path, [])) == [f"done: {tmp_path}"]
 
 
 def to_try() -> list[list[str]]:

@@ -9,7 +9,7 @@ from fe_models.geometry.imported import patch, read_bodies
 from fe_models.meshes.gmsh_session import gmsh_model
 from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import BLOCKS, TO_AND_FRO, edit, refused, run, write_case
-from workflow.kinds import load_case, template
+from workflow.kinds import load_case
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 
@@ -209,17 +209,3 @@ def test_names_that_are_not_there(blocks, key, name, wrong):
     message = refused(blocks, f"structure.{key}={name}")
     assert message.startswith(f"--set structure.{key}={name}: ")
     assert wrong in message
-
-
-def test_place_in_the_file_is_named(blocks):
-    lines = edit(blocks, "group: base_low", "group: nix")
-    number = next(n for n, line in enumerate(lines, 1) if "group: nix" in line)
-    assert refused(blocks).startswith(f"{blocks}:{number}: structure.supports.0.group: ")
-
-
-def test_template_lacks_its_file(tmp_path):
-    path = tmp_path / "mesh.yaml"
-    path.write_text(template("mesh"), encoding="utf-8")
-    ending = invoke("check", path)
-    assert ending.exit_code == 2
-    assert "structure.file: 'joint.msh': no such file" in ending.stderr

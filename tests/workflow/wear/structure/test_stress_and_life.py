@@ -318,36 +318,6 @@ def test_section_lies_where_it_says(axis: str) -> None:
 # --- pictures -----------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["normal", "line"])
-def test_figures_say_what_the_summary_says(request: pytest.FixtureRequest, method: str) -> None:
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    from workflow.analyses.wear.figures import wear as figures
-    from workflow.pictures.style import STYLE
-
-    run = request.getfixturevalue(method)
-    told = {
-        "subsurface_stress": ("von_mises", ".0f"),
-        "fretting_life": ("cracking_parameter", ".3g"),
-    }
-    with h5py.File(run.folder / "results.h5") as file, rc_context(STYLE):
-        drawings = figures.figures_of(contents_of(run.folder))
-        for name, (quantity, digits) in told.items():
-            figure = drawings[name](file)
-            FigureCanvasAgg(figure).draw()
-            for text in [axis._left_title for axis in figure.axes] + [figure._suptitle]:
-                box = text.get_window_extent()
-                assert box.x0 >= 0, text.get_text()
-                assert box.x1 <= figure.bbox.x1, text.get_text()
-            for flank in FLANKS:
-                bodies = run.summary[flank]["stress"][quantity].values()
-                largest = [max(body[m]["value"] for body in bodies) for m in ("unworn", "worn")]
-                text = " → ".join(format(value, digits) for value in largest)
-                assert f"{flank} {text}" in figure.get_suptitle()
-
-
 @pytest.fixture(scope="module")
 def paraview(normal: Any) -> Path:
     from workflow.analyses.wear.paraview.wear import write_wear
