@@ -35,6 +35,7 @@ joint: {law: polynomial_spring, stiffness: 0 N/mm, cubic: 1e6 N/mm^3}
 forces: [0.5 N]
 frequencies: [150 Hz, 170 Hz]
 resolution: {harmonics: 1, samples: 32}
+stability: none
 output: {figures: [svg], paraview: false}
 """
 

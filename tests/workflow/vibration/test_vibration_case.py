@@ -23,6 +23,7 @@ structure: {kind: rig, masses: [20 kg, 1 kg], springs: [1 N/um, 200 N/um], dampi
 joint: {law: jenkins, normal_load: 100 N, friction: 0.5, stiffness: 10 N/um}
 forces: [2 N, 60 N]
 frequencies: [20 Hz, 300 Hz]
+stability: none
 output: {figures: false}
 """
 ONE_MASS = """\
@@ -33,6 +34,7 @@ joint: {law: jenkins, normal_load: 10 N, friction: 0.5, stiffness: 1500, residua
 forces: [10 N]
 frequencies: [80 Hz, 200 Hz]
 resolution: {harmonics: 1, samples: 4096}
+stability: none
 output: {figures: false}
 """
 STIFFNESS = 1e4
@@ -200,7 +202,7 @@ def test_new_writes_a_case_that_runs(tmp_path):
     case = parse_case(path.read_text(encoding="utf-8"), str(path))
     assert isinstance(case, VibrationCase)
     assert tuple(case.resolution.harmonics) == (1, 3, 5, 7, 9, 11, 13, 15)
-    settings = ("--set", "forces=[10 N]", "--set", "output.figures=false")
+    settings = ("--set", "frequencies=[95 Hz, 100 Hz]", "--set", "output.figures=false")
     assert invoke("run", path, "--out", tmp_path / "out", *settings).exit_code == 0
 
 
