@@ -239,10 +239,7 @@ def test_no_temperature_changes_nothing():
     ("load", "wrong"),
     [
         (TemperatureChange(HOT, "middle"), "no body middle; allowed: lower, upper"),
-        (
-            NodalTemperature(np.arange(2, 100), np.ones(98), "lower"),
-            "1 of 36 nodes have no temperature, the first is 1;",
-        ),
+        (NodalTemperature(np.arange(2, 100), np.ones(98), "lower"), "1 of 36 nodes have no"),
         (NodalTemperature(np.arange(100), np.ones(100)), "36 of 36 nodes"),
     ],
 )

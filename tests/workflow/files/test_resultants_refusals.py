@@ -100,10 +100,7 @@ def test_a_wrong_header_is_refused(tmp_path, header, error):
 
 def test_missing_columns_name_those_present(tmp_path):
     path = write(tmp_path, "# loads\nP, Qx, Edx [J]\n1, 2, 3\n")
-    with pytest.raises(
-        InputFileError,
-        match=r"csv:2: no column Qy, .*; this file has 'P', 'Qx', 'Edx \[J\]'; allowed: P, Qx",
-    ):
+    with pytest.raises(InputFileError, match=r"csv:2: no column Qy, .*; this file has 'P', 'Qx',"):
         read_resultants(path)
 
 

@@ -130,15 +130,9 @@ OPPOSED = (
     [
         (["forces="], "missing; allowed: forces, or an excitation"),
         ([f"excitation={{{ONE}}}"], "given beside an excitation; allowed: excitation.levels"),
-        (
-            ["forces=", "mass=2", f"excitation={{{ONE}}}"],
-            "2: given beside an excitation, which names its places; allowed: one of them",
-        ),
+        (["forces=", "mass=2", f"excitation={{{ONE}}}"], "2: given beside an excitation, which"),
         (["forces=", "excitation={levels: [1]}"], "nothing drives; allowed: forces, records or"),
-        (
-            ["forces=", f"excitation={{levels: [2, 1], {ONE}}}"],
-            "not ascending; allowed: each level above the last",
-        ),
+        (["forces=", f"excitation={{levels: [2, 1], {ONE}}}"], "not ascending; allowed: each"),
         (
             ["forces=", "excitation={forces: [{points: m1, amplitude: 1, harmonic: 2}]}"],
             "no harmonic 1; allowed: one, frequencies being those of the slowest part",
