@@ -276,9 +276,7 @@ def test_dimensions_are_compared_in_the_middle(small_path, tmp_path, monkeypatch
 @pytest.mark.slow
 def test_explicit_steps_that_take_too_long_are_left_out(small_path, tmp_path, monkeypatch):
     runs, ladders = made_up(monkeypatch, small_path, tmp_path, axes=("stepper",), limit=5.0)
-    assert ladders["stepper"].failed == {
-        "explicit, 0.9 of its limit": "it would take 6.7e+03 steps of 4.5 cycles"
-    }
+    assert list(ladders["stepper"].failed) == ["explicit, 0.9 of its limit"]
     assert not any("explicit" in job.name for job in runs.ran)
 
 

@@ -324,12 +324,6 @@ class TestCase:
             assert load["volumes"] == [0.0, 0.0]
             assert load["cycles"] == 1e5
 
-    def test_run_without_a_manifest_is_started_again(self, folder, curved, tmp_path):
-        (tmp_path / "case.yaml").write_text((curved / "case.yaml").read_text(), encoding="utf-8")
-        result = invoke("resume", tmp_path)
-        assert result.exit_code == 2
-        assert "start it again with `fretscale run" in result.stderr
-
 
 @pytest.mark.slow
 @pytest.mark.long

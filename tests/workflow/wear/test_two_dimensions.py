@@ -341,16 +341,6 @@ def test_choice_is_kept_until_the_run_is_finished(plane_path, tmp_path):
     assert load_case(folder.case) == case
 
 
-def test_check_says_that_a_probe_decides(plane_path):
-    told = invoke("check", plane_path, "--set", "fidelity=auto", "--set", "accuracy=4 %").stdout
-    assert "2-D or 3-D and how fine, by probes: 4 %" in told
-    fixed = invoke("check", plane_path).stdout
-    assert "by probes" not in fixed
-    assert "fidelity fixed" in fixed  # among what nobody has said
-    assert "dovetail in 2-D, 40 nodes on a flank" in fixed
-    assert "128 strips" in fixed
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("dimension_only")
 def test_run_writes_what_was_chosen_and_why(plane_path, tmp_path):
