@@ -272,16 +272,3 @@ assert not {{"gmsh", "skfem", "meshio"}} & set(sys.modules)
 
 
 # --- shipped cases ------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    ["sphere_normal", "sphere_fretting", "sphere_torsion", "line_bulk_stress", "line_dissimilar"],
-)
-def test_shipped_case_meets_its_expectations(whole, name, tmp_path):
-    text = (CASES / f"{name}.yaml").read_text(encoding="utf-8")
-    path = tmp_path / f"{name}.yaml"
-    path.write_text(f"{text}\noutput: {{paraview: false, figures: false}}\n", encoding="utf-8")
-    done = invoke("verify", path, "--out", tmp_path / "out")
-    assert done.exit_code == 0, (done.stdout, done.stderr)

@@ -21,7 +21,6 @@ from workflow.analyses.time.rig import motion_of
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case
-from workflow.runs.verify import verify_cases
 from workflow.shell.terminal.reporter import Reporter
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -363,8 +362,3 @@ def test_files_without_a_body_are_refused(two_masses):
     of_a_case = "structure.file=rig.yaml", "structure.body=1"
     with pytest.raises(UserError, match="no case of specimens"):
         rig_of(two_masses, *of_a_case, text=AS_A_BODY)
-
-
-@pytest.mark.slow
-def test_the_specimen_that_is_hit_is_verified(tmp_path):
-    assert verify_cases((CASES / "rig_reduced.yaml",), tmp_path)

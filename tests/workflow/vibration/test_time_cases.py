@@ -7,7 +7,6 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.marks import slow
 from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.vibration.time_scenes import (
     AMPLITUDE,
@@ -26,7 +25,6 @@ from workflow.analyses.time.memory import memory
 from workflow.chart.axes import axes_of
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case
-from workflow.runs.verify import verify_cases
 
 CASES = Path(__file__).parents[3] / "cases"
 LAWS = ("bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan")
@@ -308,16 +306,3 @@ def test_memory_grows_with_what_is_recorded(monkeypatch, tmp_path):
     code, message = refused(tmp_path, RIG, *overrides)
     assert code == 4
     assert "raise integration.step" in message
-
-
-@pytest.mark.parametrize(
-    "name", [slow("rig_bouc_wen"), slow("bolted_joint_test2"), "bolted_joint_test4"]
-)
-def test_papers_joints_are_verified(tmp_path, name):
-    assert verify_cases((CASES / f"{name}.yaml",), tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["rig_force_75N", "rig_hammer_7N", "rig_hammer_60N"])
-def test_papers_rigs_are_verified(tmp_path, name):
-    assert verify_cases((CASES / f"{name}.yaml",), tmp_path)

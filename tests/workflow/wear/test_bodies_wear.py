@@ -322,13 +322,6 @@ def test_a_loop_on_worn_surfaces_keeps_the_tilt_too() -> None:
         assert path.moments == moments
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["cylinder_wear", "sphere_wear"])
-def test_cases_of_the_repository_are_verified(name: str, tmp_path: Path) -> None:
-    done = command("verify", CASES / f"{name}.yaml", "--out", tmp_path)
-    assert done.exit_code == 0, done.output
-
-
 # --- what wear steps leave ------------------------------------------------------------------------
 
 
