@@ -315,3 +315,8 @@ def test_slice_in_plane_strain_is_refused(blocks):
     held = [{"group": group, "hold": "y"} for group in ("base_high", "foot_low", "foot_high")]
     supports = json.dumps([*BLOCKS["supports"], *held])
     assert "as in a slice in plane strain" in refused(blocks, f"structure.supports={supports}")
+
+
+@pytest.mark.parametrize("name", ["contacts", "supports", "loads"])
+def test_lists_hold_something(blocks, name):
+    assert f"structure.{name}=[]: a list of 0: too short" in refused(blocks, f"structure.{name}=[]")
