@@ -444,9 +444,10 @@ def text(tmp_path):
 @pytest.mark.parametrize(
     ("override", "words"),
     [
+        ("joint.normal_load=0", "above 0"),
+        ("wear.cycles=[10, 10]", "not ascending"),
         ("structure.kind=joint", "allowed: rig, friction_rig, reduced, matrices"),
         ("joint.law=jenkins", "friction_contact"),
-        ("contact={file: specimens.yaml}", "unknown key"),
         ("structure.specimens=nothing.yaml", "no such file"),
     ],
 )

@@ -124,7 +124,6 @@ def uncommented(line: str) -> str:
         ("structure.size=[11]", "structure.size", "a list of 1: not a size; allowed: [x, y]"),
         ("structure.size=11 mm", "structure.size", "a list of 1: not a size; allowed: [x, y]"),
         ("structure.gap=", "structure.gap", "no height of early; allowed: shape rounded"),
-        ("structure.gap.shape=cone", "structure.gap.shape", "rounded, paraboloid, heights"),
         ("structure.gap.edge_width=6", "structure.gap.edge_width", "size of the face, 5.5 mm"),
         ("structure.gap.edge_width=40", "structure.gap.edge_width", "below edge_radius, 30 mm"),
         ("structure.gap.end_radius=", "structure.gap.end_width", "end_width and end_radius"),
