@@ -220,6 +220,7 @@ def test_residual_stiffness_is_taken_off_for_laws_beside_a_spring(folder):
             "no column amplitude",
         ),
         ("volumes.csv", "\n2900, 7.3e-3\n4000, 8.5e-3", "", "2 values for 2 free parameters"),
+        ("loops.csv", "energy [J]", "energy", "loops.csv:1: 'energy': no unit"),
     ],
 )
 def test_nonsense_is_refused_with_its_place(folder, file, old, new, words):

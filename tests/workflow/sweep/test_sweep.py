@@ -165,6 +165,10 @@ def test_example_is_a_sweep():
         ("+{values: [0.5 mm]}", 3, "unit 'mm' cannot be converted to a ratio"),
         ("+{values: [0.5]}\nset: {contact.gird: 3}", 4, "unknown key; did you mean 'grid'?"),
         ("case: contact.yaml\nvary:\n  friktion.coefficient: {values: [1]}", 3, "did you mean"),
+        ("vary: {}", 1, "case: missing; allowed: file"),
+        ("+{values: []}", 3, "too short"),
+        ("+{range: {from: 0, to: 2, count: 1}}", 3, "1: out of range"),
+        ("+{distribution: {kind: weibull}}", 3, "kind: 'weibull': not known"),
     ],
 )
 def test_nonsense_is_told_before_anything_runs(tmp_path, text, line, words):

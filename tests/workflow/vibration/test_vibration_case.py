@@ -188,6 +188,9 @@ def test_files_of_a_run(tmp_path):
         ("resolution.harmonics=[3, 5]", "1 among them"),
         ("resolution.samples=30", "too few for harmonic 15; allowed: above 30"),
         ("assumed=[drive]", "no such entry"),
+        ("loops={frequency: 100 Hz, harmonics: [0]}", "out of range"),
+        ("resolution.harmonics=[1, 2.5]", "not all of them harmonics"),
+        ("resolution.harmonics=0", "out of range"),
     ],
 )
 def test_mistakes_are_told_in_one_line(tmp_path, override, words):
