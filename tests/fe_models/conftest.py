@@ -76,9 +76,7 @@ def coarse_mesh(dovetail: Dovetail) -> StructureMesh:
 
 
 @pytest.fixture(scope="session")
-def structure_of(
-    dovetail: Dovetail, titanium: Material, mission: Mission
-) -> Callable[..., tuple[Structure, JointStiffness]]:
+def structure_of(dovetail, titanium, mission):
     """Return the coarse structure and condensed joint of the default dovetail with changed fields.
 
     Of the mission only the airfoil is part of the structure; speeds and moment are amplitudes.

@@ -7,12 +7,7 @@ import pytest
 
 from fe_models.dynamics.excitation import HammerBlow, HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.rig import (
-    Link,
-    lumped_rig,
-    natural_frequencies,
-    unit_force,
-)
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
@@ -45,8 +40,7 @@ class Elastic:
 def stop(stiffness, gap):
     """Return a spring that is touched at a gap."""
     return Elastic(
-        lambda u: stiffness * np.maximum(u - gap, 0.0),
-        lambda u: np.where(u > gap, stiffness, 0.0),
+        lambda u: stiffness * np.maximum(u - gap, 0.0), lambda u: np.where(u > gap, stiffness, 0.0)
     )
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.wear.joints.friction_paths import lead_along_one
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import march_joints
 
 LIMIT, RESIDUAL = 30.0, 900.0
 COMMON = (40e3, 0.5, 60.0, RESIDUAL)
@@ -22,12 +22,6 @@ LAWS = {
 }
 EVERY = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 RNG_SEED = 11
-
-
-def lead(law, displacement, state=None, start=0.0):
-    path = np.asarray(displacement, float)[:, None, None]
-    state = law.rest(1) if state is None else state
-    return march_joints(law, state, np.full((1, 1), start), path)
 
 
 @EVERY
@@ -49,15 +43,15 @@ def test_fully_stuck_start(law):
 def test_a_step_far_too_large_is_right(law):
     """One increment spans a thousand reaches, from a history of nested loops, and back."""
     path = REACH * np.random.default_rng(RNG_SEED).uniform(-1.0, 1.0, 50)
-    state, start = lead(law, path).state, path[-1]
+    state, start = lead_along_one(law, path).state, path[-1]
     far = 1000.0 * REACH
     for end in (far, -far):
-        once = lead(law, [end], state, start)
-        many = lead(law, np.linspace(start, end, 20001)[1:], state, start)
+        once = lead_along_one(law, [end], state, start)
+        many = lead_along_one(law, np.linspace(start, end, 20001)[1:], state, start)
         assert once.force[-1, 0, 0] == pytest.approx(np.sign(end) * (LIMIT + RESIDUAL * far))
         np.testing.assert_allclose(once.force[-1], many.force[-1], rtol=1e-11)
         assert once.dissipated.sum() == pytest.approx(many.dissipated.sum(), rel=1e-9)
-    there_and_back = lead(law, [far, -far, far])
+    there_and_back = lead_along_one(law, [far, -far, far])
     assert there_and_back.dissipated[1:].sum() == pytest.approx(
         float(law.loop_energy(far)), rel=1e-9
     )
@@ -77,15 +71,15 @@ def test_preload_worn_to_nothing(law, load):
     """Only the residual slope remains in any state; the spring's energy is lost at most once."""
     worn = replace(law, normal_load=load)
     path = REACH * np.random.default_rng(RNG_SEED).uniform(-3.0, 3.0, 30)
-    for state, start in ((law.rest(1), 0.0), (lead(law, path).state, path[-1])):
-        history = lead(worn, path, state, start)
+    for state, start in ((law.rest(1), 0.0), (lead_along_one(law, path).state, path[-1])):
+        history = lead_along_one(worn, path, state, start)
         np.testing.assert_allclose(history.force[:, 0, 0], RESIDUAL * path, atol=1e-12)
         assert np.all(history.dissipated[1:] < 1e-12)
         assert 0.0 <= history.dissipated[0, 0] <= 0.5 * LIMIT * REACH * (1.0 + 1e-12)
         still = worn.respond(history.state, np.zeros((1, 1)))
         assert np.all(np.isfinite(still.force))
         # Displacement, and a finite memory: a load that returns finds a joint that works.
-        back = lead(law, path, history.state, path[-1])
+        back = lead_along_one(law, path, history.state, path[-1])
         assert np.all(np.abs(back.force[:, 0, 0] - RESIDUAL * path) <= LIMIT * (1.0 + 1e-12))
         assert np.all(back.dissipated >= 0.0)
     assert worn.loop_energy(REACH) < 1e-12
@@ -102,6 +96,6 @@ def test_no_preload_has_the_residual_tangent(law):
 @EVERY
 def test_frictionless_from_the_start_and_without_residual_slope(law):
     free = replace(law, friction=0.0, residual_stiffness=0.0)
-    history = lead(free, REACH * np.array([1.0, -2.0, 0.5]))
+    history = lead_along_one(free, REACH * np.array([1.0, -2.0, 0.5]))
     np.testing.assert_array_equal(history.force, 0.0)
     np.testing.assert_array_equal(history.dissipated, 0.0)

@@ -23,6 +23,7 @@ from sa_solver import (
     partial_slip_curve,
 )
 from sa_solver.reference.hertz import HertzCylinder, HertzEllipse, HertzSphere
+from tests.given import NO_NUMBERS, assert_refused, held_otherwise, spoilt
 
 STEEL, SOFT = Material(210e3, 0.3), Material(70e3, 0.3)
 ALIKE, UNLIKE = ElasticPair(STEEL, STEEL), ElasticPair(STEEL, SOFT)
@@ -90,13 +91,10 @@ def test_numbers_count_and_not_how_they_are_held(entry):
     field, made = ENTRIES[entry]
     field = field.astype(np.float32).astype(np.float64)
     expected = made(field)
-    longer = np.repeat(field, 2, axis=-1)[..., ::2]
-    unmasked = np.ma.array(field, mask=False)
-    for given in (field.tolist(), field.astype(np.float32), np.asfortranarray(field), longer):
+    for given in held_otherwise(field):
         found = made(given)
         assert type(found) is np.ndarray
         assert_same(found, expected)
-    assert_same(made(unmasked), expected)
     whole = np.round(field / np.abs(field).max() * 3.0)
     assert_same(made(whole.astype(int)), made(whole))
 
@@ -107,27 +105,18 @@ def test_what_is_no_field_of_numbers_is_refused(entry, kind):
     field, made = ENTRIES[entry]
     if kind == "none" and entry in ("compliance", "offset"):
         return  # They may be left out.
-    hole = np.ma.array(field, mask=field > 0.5 * field.max())
     if kind == "masked" and entry in HEIGHTS:
-        assert np.isfinite(made(hole)).all()
+        assert np.isfinite(made(spoilt(field, kind))).all()
         return
-    given = {
-        "turned": field.swapaxes(-1, -2),
-        "one": 1.0,
-        "complex": field + 0j,
-        "text": field.astype(str),
-        "flags": field > 0.0,
-        "none": None,
-        "masked": hole,
-    }[kind]
+    given = spoilt(field, kind)
     with pytest.raises(InputError):
         made(given)
 
 
-@pytest.mark.parametrize("value", [np.nan, "100", [100.0], True, np.ma.masked, 1j])
+@pytest.mark.parametrize("value", NO_NUMBERS)
 def test_what_is_no_number_is_refused(value):
     contact = NormalContact(HALF_SPACE)
-    for attempt in (
+    attempts = (
         lambda: contact.solve(BALL, value),
         lambda: contact.solve(BALL, P, tolerance=value),
         lambda: TangentialContact(HALF_SPACE).solve(LIMIT, Qx=value),
@@ -141,9 +130,8 @@ def test_what_is_no_number_is_refused(value):
         lambda: ElasticPair.from_contact_modulus(value),
         lambda: HertzSphere(value, 10.0, 1e5),
         lambda: Grid.strips(value, 8),
-    ):
-        with pytest.raises(InputError):
-            attempt()
+    )
+    assert_refused(InputError, attempts)
 
 
 @pytest.mark.parametrize(

@@ -62,9 +62,7 @@ def test_jumps_may_be_as_long_as_they_wear(size: JumpSize, column: slice) -> Non
     ],
     ids=["given", "automatic", "by volume"],
 )
-def test_jumps_that_are_left_are_foreseen(
-    jump: JumpSize, tolerance: float | None, left: list[int] | None
-) -> None:
+def test_jumps_that_are_left_are_foreseen(jump, tolerance, left):
     """The estimate is exact for given jumps, and within a factor of two for growing ones.
 
     The latter holds from the third jump on.

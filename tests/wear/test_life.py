@@ -7,13 +7,7 @@ import pytest
 
 from sa_solver.types import Material
 from tests.marks import slow
-from wear.cracking.life import (
-    PlaneSearch,
-    StressHistoryError,
-    findley,
-    ruiz,
-    smith_watson_topper,
-)
+from wear.cracking.life import PlaneSearch, StressHistoryError, findley, ruiz, smith_watson_topper
 from wear.cracking.smallest_circle import smallest_circle
 
 STEEL = Material(200e3, 0.3)

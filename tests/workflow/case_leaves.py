@@ -297,9 +297,7 @@ GIVEN["vibration"] = {
     "ring": {ALWAYS: {"sectors": 24, "axis": "turning", "faces": FACES}},
     "loops": {ALWAYS: {"frequency": "100 Hz"}},
     "modes": {ALWAYS: {"amplitudes": ["0.1 um", "20 um"]}},
-    "further_branches": {
-        ALWAYS: [{"force": "40 N", "frequency": "200 Hz", "amplitude": "50 um"}],
-    },
+    "further_branches": {ALWAYS: [{"force": "40 N", "frequency": "200 Hz", "amplitude": "50 um"}]},
 }
 GIVEN["reduced_wear"] = {
     "structure": {"matrices": MATRICES},
@@ -316,13 +314,7 @@ GIVEN["rig"] = GIVEN["joint"] | {
     "joint": JOINTS | {"friction_contact": CONTACT},
     "ageing": {ALWAYS: {"cycles": 1000}},
     "excitation": {
-        "hammer": {
-            "kind": "hammer",
-            "force": 1,
-            "duration": 4e-4,
-            "record": 1,
-            "band": [1, 500],
-        },
+        "hammer": {"kind": "hammer", "force": 1, "duration": 4e-4, "record": 1, "band": [1, 500]},
         "recorded": {"kind": "recorded", "file": "force.csv"},
     },
 }

@@ -269,8 +269,7 @@ def renamed(body: Body, name: str, names: dict[str, str]) -> Body:
     """Return the body with some of its boundaries, under other names."""
     mesh = replace(body.mesh, _boundaries=None)
     return Body(
-        name,
-        mesh.with_boundaries({new: body.mesh.boundaries[old] for old, new in names.items()}),
+        name, mesh.with_boundaries({new: body.mesh.boundaries[old] for old, new in names.items()})
     )
 
 

@@ -140,9 +140,7 @@ def test_new_analysis_that_keeps_nothing_is_not_resumed(ball: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize(("value", "code", "verdict"), [(RADIUS, 0, "met"), (0.3, 1, "MISSED")])
-def test_new_analysis_is_verified(
-    ball: Path, tmp_path: Path, value: float, code: int, verdict: str
-) -> None:
+def test_new_analysis_is_verified(ball, tmp_path, value, code, verdict):
     expected = (
         f"{{quantity: contact.radius, value: {value!r}, tolerance: 1e-9, kind: closed_form, "
         "source: Hertz}"

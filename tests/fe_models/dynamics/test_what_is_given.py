@@ -36,6 +36,7 @@ from fe_models.dynamics import (
 from fe_models.dynamics.damping import rayleigh_factors
 from fe_models.dynamics.motion import Start
 from sa_solver import InputError
+from tests.given import NO_NUMBERS, assert_refused, held_otherwise, spoilt
 from wear.joints import Jenkins, PeriodicMarch
 
 MASSES = {"a": 0.5, "b": 1.0}
@@ -113,10 +114,7 @@ ENTRIES = {
         np.array([8.0, 16.0]),
         lambda f: np.array(rayleigh_factors(f, [0.0625, 0.125])),
     ),
-    "span": (
-        np.array([2.0, 2.5]),
-        lambda span: along_frequency(problem(), 1.0, span).frequencies,
-    ),
+    "span": (np.array([2.0, 2.5]), lambda span: along_frequency(problem(), 1.0, span).frequencies),
     "output": (
         FORCE,
         lambda out: (
@@ -134,13 +132,10 @@ def test_numbers_count_and_not_how_they_are_held(entry):
     field, made = ENTRIES[entry]
     field = field.astype(np.float32).astype(np.float64)
     expected = made(field)
-    longer = np.repeat(field, 2, axis=-1)[..., ::2]
-    unmasked = np.ma.array(field, mask=False)
-    for given in (field.tolist(), field.astype(np.float32), np.asfortranarray(field), longer):
-        np.testing.assert_allclose(made(given), expected, rtol=1e-6, atol=1e-12)
-    found = made(unmasked)
-    assert type(found) is np.ndarray
-    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-12)
+    for given in held_otherwise(field):
+        found = made(given)
+        assert type(found) is np.ndarray
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-12)
 
 
 def test_whole_numbers_are_numbers():
@@ -159,21 +154,14 @@ def test_what_is_no_field_of_numbers_is_refused(entry, kind):
     field, made = ENTRIES[entry]
     if (kind == "deep" and entry in ANY_SHAPE) or (kind == "turned" and entry != "connection"):
         return
-    given = {
-        "text": field.astype(str),
-        "flags": field > 0.0,
-        "masked": np.ma.array(field, mask=field == field.max()),
-        "missing": np.where(field == field.max(), np.nan, field),
-        "deep": field[None],
-        "turned": field.T,
-    }[kind]
+    given = spoilt(field, kind)
     with pytest.raises(InputError):
         made(given)
 
 
-@pytest.mark.parametrize("value", [np.nan, "100", [100.0], True, np.ma.masked, 1j])
+@pytest.mark.parametrize("value", NO_NUMBERS)
 def test_what_is_no_number_is_refused(value):
-    for attempt in (
+    attempts = (
         lambda: lumped_rig({"m": value}, {}, []),
         lambda: lumped_rig({"m": 1.0}, {Link("m"): value}, []),
         lambda: damped(RIG, mass_factor=value),
@@ -201,9 +189,8 @@ def test_what_is_no_number_is_refused(value):
         lambda: frequency_response(STRIKE, RECORD, value),
         lambda: ring_down(DECAY, value, (24.0, 40.0)),
         lambda: motions_at(along_frequency(problem(), 1.0, (2.0, 2.1)), value),
-    ):
-        with pytest.raises(InputError):
-            attempt()
+    )
+    assert_refused(InputError, attempts)
 
 
 @pytest.mark.parametrize(

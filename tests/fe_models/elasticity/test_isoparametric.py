@@ -171,12 +171,7 @@ def lame(r, inner=10.0, outer=20.0, pressure=100.0):
 
 def expand(elastic, pressure=100.0):
     """Return the displacement of a quarter under internal pressure."""
-    held = np.concatenate(
-        [
-            2 * elastic.boundary_nodes("x") + 1,
-            2 * elastic.boundary_nodes("z"),
-        ]
-    )
+    held = np.concatenate([2 * elastic.boundary_nodes("x") + 1, 2 * elastic.boundary_nodes("z")])
     free = np.setdiff1d(np.arange(elastic.size), held)
     load = pressure * elastic.pressure_load("bore")
     displacement = np.zeros(elastic.size)

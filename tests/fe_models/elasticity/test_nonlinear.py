@@ -10,11 +10,7 @@ from scipy.spatial.transform import Rotation
 from fe_models.dovetail import dovetail_softening, dovetail_structure
 from fe_models.elasticity import nonlinear
 from fe_models.elasticity.nonlinear import check_nonlinearity, face_sizes, slip_change
-from fe_models.elasticity.relinearised import (
-    mean_rotation,
-    relinearised,
-    stress_stiffened,
-)
+from fe_models.elasticity.relinearised import mean_rotation, relinearised, stress_stiffened
 from fe_models.elasticity.total_lagrangian import TotalLagrangian
 from fe_models.joints import friction
 from fe_models.joints.friction import FrictionalJoint
@@ -236,10 +232,7 @@ def test_mission_of_a_prestressed_structure(kind, balance, peak, tangent, missio
 def test_supported_body_keeps_its_stiffness(peak, tangent, monkeypatch):
     """Check that a supported body 2 has no rigid motion to be released."""
     monkeypatch.setattr(SupportedBody, "free_motions", lambda *_: np.zeros((0, 6)))
-    path, exact = (
-        tangent[0].condense_path(peak.like),
-        tangent[0].condense(peak.like).resolvent(),
-    )
+    path, exact = (tangent[0].condense_path(peak.like), tangent[0].condense(peak.like).resolvent())
     np.testing.assert_allclose(path.inverse, exact.inverse, rtol=1e-12)
     np.testing.assert_allclose(path.loads, exact.loads, rtol=1e-12)
 

@@ -11,12 +11,7 @@ from fe_models.geometry.imported import ImportedMesh, read_bodies
 from fe_models.joints.friction import FrictionalJoint
 from fe_models.meshes.isoparametric import folded
 from fe_models.meshes.remesh import worn_mesh
-from fe_models.meshes.second_order import (
-    curvature,
-    distance_of_midsides,
-    set_nodes,
-    with_midsides,
-)
+from fe_models.meshes.second_order import curvature, distance_of_midsides, set_nodes, with_midsides
 from fe_models.meshes.structure_mesh import (
     Body,
     MeshError,

@@ -24,12 +24,7 @@ from fe_models.supported_body import SupportedBody
 from sa_solver.types import Material
 
 ORDERS, DIMENSIONS = [1, 2], [2, 3]
-ELEMENTS = {
-    (2, 1): ElementTriP1,
-    (2, 2): ElementTriP2,
-    (3, 1): ElementTetP1,
-    (3, 2): ElementTetP2,
-}
+ELEMENTS = {(2, 1): ElementTriP1, (2, 2): ElementTriP2, (3, 1): ElementTetP1, (3, 2): ElementTetP2}
 MATERIAL = Material(100.0, 0.3)
 AXES = np.eye(3)
 OUTWARD = {

@@ -9,12 +9,7 @@ from fe_models import structure
 from fe_models.elasticity.body import ElasticBody
 from fe_models.elasticity.stress import stress_field
 from fe_models.geometry.imported import ImportedMesh
-from fe_models.imported_structure import (
-    ContactPair,
-    Support,
-    imported_mesh,
-    imported_structure,
-)
+from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
 from fe_models.joints import friction
 from fe_models.joints.friction import FrictionalJoint
 from fe_models.loads.applied_loads import BoundaryForce, Pressure

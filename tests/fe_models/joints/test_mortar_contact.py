@@ -215,10 +215,7 @@ def rub(elastics, held, face, load, friction):
     loads = np.zeros((elastics[0].size, 1)), load[:, None]
     bodies = [
         SupportedBody(
-            elastics[k],
-            supports[k],
-            *interface_nodes([(face, k + 1)], elastics[k].body),
-            loads[k],
+            elastics[k], supports[k], *interface_nodes([(face, k + 1)], elastics[k].body), loads[k]
         )
         for k in range(2)
     ]

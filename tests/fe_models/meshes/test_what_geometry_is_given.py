@@ -5,6 +5,7 @@ import pytest
 
 from fe_models.geometry import Dovetail, Specimen, read_bodies
 from fe_models.meshes.structure_mesh import MeshError
+from tests.given import NO_NUMBERS, assert_refused, held_otherwise, spoilt
 
 SECTION = {
     "flank_angle": np.radians(45.0),
@@ -41,9 +42,7 @@ EVERY = pytest.mark.parametrize("entry", ENTRIES)
 def test_numbers_count_and_not_how_they_are_held(entry):
     field, made = ENTRIES[entry]
     expected = made(field)
-    longer = np.repeat(field, 2)[::2]
-    unmasked = np.ma.array(field, mask=False)
-    for given in (field.tolist(), field.astype(np.float32), longer, unmasked):
+    for given in held_otherwise(field):
         found = made(given)
         assert type(found) is np.ndarray
         np.testing.assert_array_equal(found, expected)
@@ -64,22 +63,14 @@ def test_what_is_no_field_of_numbers_is_refused(entry, kind):
     field, made = ENTRIES[entry]
     if kind == "none" and entry == "radii":
         return  # of flat strips
-    given = {
-        "complex": field + 0j,
-        "text": field.astype(str),
-        "flags": field > 0.0,
-        "none": None,
-        "masked": np.ma.array(field, mask=field == field.max()),
-        "missing": np.where(field == field.max(), np.nan, field),
-        "short": np.append(field, field[-1]),
-    }[kind]
+    given = spoilt(field, kind)
     with pytest.raises(MeshError):
         made(given)
 
 
-@pytest.mark.parametrize("value", [np.nan, "1", [1.0], True, np.ma.masked, 1j])
+@pytest.mark.parametrize("value", NO_NUMBERS)
 def test_what_is_no_number_is_refused(value):
-    for attempt in (
+    attempts = (
         *(lambda name=name: Dovetail(**SECTION | {name: value}) for name in SECTION),
         lambda: Dovetail(**SECTION, skew=value),
         lambda: Dovetail(**SECTION, end_width=value),
@@ -93,9 +84,8 @@ def test_what_is_no_number_is_refused(value):
         lambda: JOINT.mesh((9, 9), size=4.0, notch=value),
         lambda: JOINT.mesh((value, 9), size=4.0),
         lambda: read_bodies("plate.step", size=value),
-    ):
-        with pytest.raises(MeshError):
-            attempt()
+    )
+    assert_refused(MeshError, attempts)
 
 
 @pytest.mark.parametrize(

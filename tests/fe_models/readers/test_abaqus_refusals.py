@@ -104,18 +104,9 @@ def test_wrong_line_is_refused_where_it_stands(tmp_path, old, new, at, message):
         ("1, 2, 3\n", "is not Abaqus input"),
         ("** nothing\n", "has no keywords"),
         (CUBES + "*Nset, nset=A\n 1\n", "node set A names number 1, which is not defined"),
-        (
-            CUBES + "*Surface, name=A\n7, S4\n",
-            "2 of the 2 facets of boundary A are inside body body_1",
-        ),
-        (
-            CUBES + "*Nset, nset=A\n11\n*Surface, name=A, type=NODE\nA,\n",
-            "a node set is named A, too",
-        ),
-        (
-            CUBES + "*Node\n1, 9., 9., 9.\n*Element, type=R3D3\n9, 11, 12, 1\n",
-            "R3D3 with nodes on no solid is a rigid surface: give",
-        ),
+        (CUBES + "*Surface, name=A\n7, S4\n", "2 of the 2 facets of boundary A are inside body"),
+        (CUBES + "*Nset, nset=A\n11\n*Surface, name=A, type=NODE\nA,\n", "a node set is named A,"),
+        (CUBES + "*Node\n1, 9., 9., 9.\n*Element, type=R3D3\n9, 11, 12, 1\n", "R3D3 with nodes on"),
         (
             CUBES.replace("C3D8R", "C3D8")[: CUBES.index("*Element")]
             + "*Element, type=R3D4\n1, 11, 12, 15, 14\n",

@@ -189,8 +189,7 @@ def test_pressed_faces_of_nastran(tmp_path, element, corners, face):
 @pytest.mark.parametrize(
     ("old", "new", "wrong"),
     [
-        ("PSOLID         3", "RBE2,50,26,123,27,28\nPSOLID         3",
-         "RBE2: the tie or constraint is not carried over; make one body"),
+        ("PSOLID         3", "RBE2,50,26,123,27,28\nPSOLID         3", "RBE2: the tie or"),
         ("PSOLID         3", "MPC,50,26,1,1.,27,1,-1.\nPSOLID         3", "MPC: the tie"),
         ("PSOLID         3", "CELAS2,50,1.+6,26,1,15,1\nPSOLID         3", "CELAS2: a spring"),
         ("PSOLID         3", "CONM2,50,26,,1.-3\nPSOLID         3", "CONM2: a point mass: leave"),
@@ -381,20 +380,8 @@ def test_gmsh_writes_what_is_read(tmp_path, shape, order):
 
 
 @pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("model.cdb", "Ansys's .cdb is not read; export it as .inp, .bdf, .unv, .msh"),
-        ("model.odb", "Abaqus's .odb is not read; export it"),
-        ("model.iges", "CAD's .iges is not read; export it"),
-        ("model.prt", "NX's .prt is not read; export it"),
-        ("model.catpart", "CATIA's .catpart is not read; export it"),
-        ("model.mechdb", "Ansys's .mechdb is not read; export it"),
-        ("model.rst", "Ansys's .rst is not read; export it"),
-        ("model.op2", "Nastran's .op2 is not read; export it"),
-        ("model.hm", "HyperMesh's .hm is not read; export it"),
-        ("model.k", "LS-DYNA's .k is not read; export it"),
-    ],
+    "ending", ["cdb", "odb", "iges", "prt", "catpart", "mechdb", "rst", "op2", "hm", "k"]
 )
-def test_other_formats_are_refused_with_what_to_export(tmp_path, name, wrong):
-    with pytest.raises(MeshError, match=wrong):
-        read(tmp_path, name, "anything")
+def test_other_formats_are_refused_with_what_to_export(tmp_path, ending):
+    with pytest.raises(MeshError, match=rf"\.{ending} is not read; export it"):
+        read(tmp_path, f"model.{ending}", "anything")

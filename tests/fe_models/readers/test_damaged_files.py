@@ -77,9 +77,7 @@ def test_a_name_in_no_code_is_one_line(tmp_path):
 def test_whatever_a_reader_raises_is_one_line(tmp_path):
     """Check an exception that cannot be passed between processes."""
     path = tmp_path / "a.msh"
-    with pytest.raises(
-        MeshError, match=r"a\.msh: cannot be read \(OddError: 7\): it may be damaged"
-    ) as error:
+    with pytest.raises(MeshError, match=r"a\.msh: cannot be read \(OddError: 7\): it may") as error:
         read_apart(raise_oddly, path)
     assert "\n" not in str(error.value)
 

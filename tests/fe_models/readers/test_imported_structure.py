@@ -6,12 +6,7 @@ from skfem import MeshTet, MeshTri
 
 from fe_models import structure
 from fe_models.elasticity.body import ElasticBody
-from fe_models.imported_structure import (
-    ContactPair,
-    Support,
-    imported_mesh,
-    imported_structure,
-)
+from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
 from fe_models.joints import friction
 from fe_models.joints.friction import FrictionalJoint
 from fe_models.loads.applied_loads import (
@@ -178,10 +173,7 @@ def test_contact_faces_that_share_nodes_are_refused():
 @pytest.mark.parametrize(
     ("supports", "wrong"),
     [
-        (
-            [Support("base", "xyz"), Support("upper_plane", "y")],
-            "held along the face on body upper",
-        ),
+        ([Support("base", "xyz"), Support("upper_plane", "y")], "held along the face on body"),
         ([Support("base", "xyz"), Support("bottom", "z")], "held along the contact's normal"),
         ([Support("base", "xyz"), Support("bottom", "mean_x")], "a mean over a boundary"),
         ([Support("base", "xy")], "let lower and upper"),
@@ -215,9 +207,7 @@ def test_displacement_against_a_support_is_refused(hold):
     """Check that it must not override supports; supports across it are allowed."""
     moved = [Displacement("lid", np.array([1e-3, 0.0, 0.0]))]
     base = Support("base", "xyz")
-    with pytest.raises(
-        MeshError, match="imposed on lid along a direction in which a support holds"
-    ):
+    with pytest.raises(MeshError, match="imposed on lid along a direction in which a support"):
         built(block_and_pad(False, True), [base, Support("lid", hold)], moved)
     built(block_and_pad(False, True), [base, Support("lid", "yz"), Support("plane", "y")], moved)
 

@@ -318,11 +318,7 @@ def lid(motion, at=AT):
     [
         ([Support("lid", "x")], [lid([1e-3] * 6)], "in which a support holds its nodes"),
         ([], [remote([1e-3] * 6, True, boundary="side")], "on nodes of a contact face"),
-        (
-            [],
-            [BoundaryForce("side", np.ones(3), rigid=True)],
-            "tied load couples nodes of a contact",
-        ),
+        ([], [BoundaryForce("side", np.ones(3), rigid=True)], "tied load couples nodes of a"),
         (
             [],
             [lid([1e-3, 0, 0, 0, 0, 0]), lid([0, 0, 0, 0, 1e-3, 0], 2.0 * AT)],

@@ -23,6 +23,7 @@ from fe_models.matrices import (
     without_massless,
     write_matrices,
 )
+from tests.given import NO_NUMBERS, assert_refused, held_otherwise, spoilt
 
 COUNT = 6
 NAMES = tuple(Unknown(str(k), "x") for k in range(COUNT))
@@ -55,8 +56,7 @@ def test_numbers_count_and_not_how_they_are_held(entry):
     """Lists, single precision, columns first, whole numbers, and every format of sparse ones."""
     field, made = ENTRIES[entry]
     expected = made(field)
-    forms = [field.tolist(), field.astype(np.float32), np.asfortranarray(field)]
-    forms.append(np.ma.array(field, mask=False))
+    forms = held_otherwise(field)
     if entry not in ("loads", "places"):
         forms += [sp.csr_matrix(field).asformat(name) for name in FORMATS]
     if entry == "stiffness":
@@ -79,17 +79,7 @@ def test_what_is_no_matrix_is_refused(entry, kind):
         entry == "places" and kind == "missing"
     ):
         return  # those of modes have none
-    given = {
-        "complex": field + 0j,
-        "text": field.astype(str),
-        "flags": field > 0.0,
-        "none": None,
-        "masked": np.ma.array(field, mask=field == field.max()),
-        "missing": np.where(field == field.max(), np.nan, field),
-        "deep": field[None],
-        "short": field[1:],
-        "skewed": field + np.eye(COUNT, field.shape[1], k=1),
-    }[kind]
+    given = spoilt(field, kind)
     sparse = (
         [] if entry in ("loads", "places") else ["complex", "flags", "missing", "short", "skewed"]
     )
@@ -98,9 +88,9 @@ def test_what_is_no_matrix_is_refused(entry, kind):
             made(each)
 
 
-@pytest.mark.parametrize("value", [np.nan, "1", [1.0], True, np.ma.masked, 1j])
+@pytest.mark.parametrize("value", NO_NUMBERS)
 def test_what_is_no_number_is_refused(value):
-    for attempt in (
+    attempts = (
         lambda: FileUnits(length=value),
         lambda: FileUnits(force=value),
         lambda: FileUnits(mass=value),
@@ -108,9 +98,8 @@ def test_what_is_no_number_is_refused(value):
         lambda: on_retained(row(), ["0"], value),
         lambda: with_light_motions(MODEL, value),
         lambda: check_definite(MODEL, {"0 x": value}),
-    ):
-        with pytest.raises(MatrixError):
-            attempt()
+    )
+    assert_refused(MatrixError, attempts)
 
 
 @pytest.mark.parametrize(

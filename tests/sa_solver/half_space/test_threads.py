@@ -36,9 +36,7 @@ def test_jobs_work_side_by_side_only_where_threads_may(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("allowed", ["1", "2"])
-def test_what_a_job_raises_is_raised_and_later_jobs_do_not_begin(
-    monkeypatch: pytest.MonkeyPatch, allowed: str
-) -> None:
+def test_what_a_job_raises_is_raised_and_later_jobs_do_not_begin(monkeypatch, allowed):
     monkeypatch.setenv(THREADS, allowed)
     begun: list[int] = []
     jobs = [_fail, *(partial(_after, 0.05, n) for n in range(2)), partial(begun.append, 1)]

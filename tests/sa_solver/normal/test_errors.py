@@ -6,12 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sa_solver.errors import (
-    ContactProblemError,
-    ConvergenceError,
-    FretscaleError,
-    InputError,
-)
+from sa_solver.errors import ContactProblemError, ConvergenceError, FretscaleError, InputError
 from sa_solver.tangential.contact import FrictionLimitError
 
 ROOT = Path(__file__).parents[3]

@@ -51,8 +51,7 @@ def pair(solution, x: float, y: float, flip: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("loading", "solution", "flip"),
-    [("sheared", cerruti, -1.0), ("pressed", boussinesq, 1.0)],
+    ("loading", "solution", "flip"), [("sheared", cerruti, -1.0), ("pressed", boussinesq, 1.0)]
 )
 def test_rectangle_is_the_integral_of_point_forces(loading, solution, flip):
     """The force is q on body 2 and -q on body 1; pressure acts into both."""

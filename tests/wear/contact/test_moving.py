@@ -237,9 +237,7 @@ def test_stroke_is_the_longest_distance() -> None:
         (0.16, 0.3, True),
     ],
 )
-def test_motion_counts_where_it_is_large_and_can_be_resolved(
-    stroke: float, half_width: float, expected: bool
-) -> None:
+def test_motion_counts_where_it_is_large_and_can_be_resolved(stroke, half_width, expected):
     pressed = np.broadcast_to(np.abs(GRID.x) < half_width, GRID.shape)
     assert moves(reciprocating(stroke, 2), pressed, GRID) is expected
 

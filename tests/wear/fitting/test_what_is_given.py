@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sa_solver import InputError
+from tests.given import NO_NUMBERS, assert_refused, held_otherwise, spoilt
 from wear.fitting import (
     ComputedScars,
     EvolutionData,
@@ -98,9 +99,7 @@ def test_numbers_count_and_not_how_they_are_held(entry):
     field, made = ENTRIES[entry]
     field = field.astype(np.float32).astype(np.float64)
     expected = made(field)
-    longer = np.repeat(field, 2, axis=-1)[..., ::2]
-    unmasked = np.ma.array(field, mask=False)
-    for given in (field.tolist(), field.astype(np.float32), longer, unmasked):
+    for given in held_otherwise(field):
         found = made(given)
         assert type(found) is np.ndarray
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-15)
@@ -125,24 +124,14 @@ def test_what_is_no_column_of_numbers_is_refused(entry, kind):
         return  # they may be left out
     if entry in ("law", "depth at") and kind in ("deep", "short", "one"):
         return  # of any length
-    given = {
-        "complex": field + 0j,
-        "text": field.astype(str),
-        "flags": field > 0.0,
-        "none": None,
-        "masked": np.ma.array(field, mask=field == field.max()),
-        "missing": np.where(field == field.max(), np.nan, field),
-        "deep": field[None],
-        "short": field[..., 1:],
-        "one": 1.0,
-    }[kind]
+    given = spoilt(field, kind)
     with pytest.raises(InputError):
         made(given)
 
 
-@pytest.mark.parametrize("value", [np.nan, "1", [1.0], True, np.ma.masked, 1j])
+@pytest.mark.parametrize("value", NO_NUMBERS)
 def test_what_is_no_number_is_refused(value):
-    for attempt in (
+    attempts = (
         lambda: Unknown("k", lower=value),
         lambda: Unknown("k", upper=value),
         lambda: Unknown("k", size=value),
@@ -154,9 +143,8 @@ def test_what_is_no_number_is_refused(value):
         lambda: RUNS.depth_at(PLACES, value),
         lambda: loop_data("record", MEASURED, most=value),
         lambda: loop_problem([loop_data("r", MEASURED)], "jenkins", {"stiffness": value}),
-    ):
-        with pytest.raises(InputError):
-            attempt()
+    )
+    assert_refused(InputError, attempts)
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,13 @@ REACH = MU * LOAD / KT  # stretch at which the slider slips under the preload
 LIFT = LOAD / KN  # lift at which the preload is gone
 
 
+def lead_along_one(law, displacement, state=None, start=0.0):
+    """Return what a march of a single joint along one direction finds."""
+    path = np.asarray(displacement, float)[:, None, None]
+    state = law.rest(1) if state is None else state
+    return march_joints(law, state, np.full((1, 1), start), path)
+
+
 def one(law, state, increment):
     """Return force, state, energy and tangent of a single joint."""
     answer = law.respond(np.atleast_2d(state), np.atleast_2d(np.asarray(increment, float)))

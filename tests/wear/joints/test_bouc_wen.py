@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from tests.wear.joints.friction_paths import lead_along_one
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.bouc_wen_curve import TabulatedBoucWen, bouc_wen_curve
 from wear.joints.iwan import UniformIwan
-from wear.joints.law import march_joints
 from wear.joints.parameters import JointError
 
 LAW = BoucWen(stiffness=40e3, friction=0.5, normal_load=60.0, residual_stiffness=900.0)
@@ -28,17 +28,11 @@ SHAPES = [
 ]
 
 
-def lead(law, displacement, state=None, start=0.0):
-    path = np.asarray(displacement, float)[:, None, None]
-    state = law.rest(1) if state is None else state
-    return march_joints(law, state, np.full((1, 1), start), path)
-
-
 @pytest.mark.parametrize("exponent", [1.0, 2.0])
 def test_loading_branch(exponent):
     law = replace(LAW, exponent=exponent)
     s = np.array([1e-3, 0.1, 1.0, 4.0, 30.0])
-    history = lead(law, s * REACH)
+    history = lead_along_one(law, s * REACH)
     xi = np.tanh(s) if exponent == 2.0 else 1.0 - np.exp(-s)
     np.testing.assert_allclose(history.force[:, 0, 0], LIMIT * xi + 900.0 * s * REACH, rtol=1e-13)
     np.testing.assert_allclose(history.state[0], [30.0 * REACH, xi[-1]], rtol=1e-14)
@@ -67,7 +61,7 @@ def test_unloading_branch_is_straight_until_no_force(exponent):
 def test_any_shape_against_an_independent_integration(sigma, exponent, kind):
     law = kind(40e3, 0.5, 60.0, 900.0, sigma=sigma, exponent=exponent)
     path = np.array([0.6, -0.3, 1.7, 1.2, 1.6, -2.5, 0.4]) * REACH
-    history = lead(law, path)
+    history = lead_along_one(law, path)
     xi, work, start = 0.0, 0.0, 0.0
     for end, force, lost in zip(path, history.force, history.dissipated, strict=True):
         sign = np.sign(end - start)
@@ -107,14 +101,14 @@ def test_energy_of_the_settled_loop(share):
     scale = LIMIT * REACH
     assert LAW.loop_energy(share * REACH) == pytest.approx(exact, rel=1e-10, abs=1e-14 * scale)
     # March until the loop has closed: a small loop takes many cycles.
-    history = lead(LAW, np.tile([share, -share], 3000) * REACH)
+    history = lead_along_one(LAW, np.tile([share, -share], 3000) * REACH)
     assert history.dissipated[-2:].sum() == pytest.approx(exact, rel=1e-4, abs=1e-14 * scale)
 
 
 @pytest.mark.parametrize(("sigma", "exponent"), SHAPES)
 def test_loop_energy_is_that_of_a_marched_loop(sigma, exponent):
     law = replace(LAW, sigma=sigma, exponent=exponent)
-    history = lead(law, np.tile([1.5, -1.5], 40) * REACH)
+    history = lead_along_one(law, np.tile([1.5, -1.5], 40) * REACH)
     assert law.loop_energy(1.5 * REACH) == pytest.approx(
         history.dissipated[-2:].sum(), rel=1e-8, abs=1e-8 * LIMIT * REACH
     )
@@ -143,9 +137,9 @@ def test_small_loops_under_a_force_do_not_close():
     """
     drifts = []
     for s in (0.02, 0.01):
-        loaded = lead(LAW, [0.8 * REACH])
+        loaded = lead_along_one(LAW, [0.8 * REACH])
         ripple = 0.8 * REACH + np.tile([-s * REACH, 0.0], 50)
-        rippled = lead(LAW, ripple, loaded.state, 0.8 * REACH)
+        rippled = lead_along_one(LAW, ripple, loaded.state, 0.8 * REACH)
         growth = 1.0 / rippled.state[0, 1] - 1.0 / loaded.state[0, 1]
         drifts.append(growth / (50 * s))
         assert rippled.force[-1, 0, 0] < loaded.force[-1, 0, 0] - 0.1 * LIMIT
@@ -154,13 +148,15 @@ def test_small_loops_under_a_force_do_not_close():
     assert errors[0] < 0.05
     assert errors[1] == pytest.approx(errors[0] / 2.0, rel=0.2)
     iwan = UniformIwan(40e3, 0.5, 60.0, 900.0)
-    loaded = lead(iwan, [0.8 * REACH])
-    rippled = lead(iwan, 0.8 * REACH + np.tile([-0.02 * REACH, 0.0], 50), loaded.state, 0.8 * REACH)
+    loaded = lead_along_one(iwan, [0.8 * REACH])
+    rippled = lead_along_one(
+        iwan, 0.8 * REACH + np.tile([-0.02 * REACH, 0.0], 50), loaded.state, 0.8 * REACH
+    )
     assert rippled.force[-1] == pytest.approx(loaded.force[-1], rel=1e-13)
 
 
 def test_force_follows_new_parameters_at_the_same_xi():
-    loaded = lead(LAW, [0.8 * REACH])
+    loaded = lead_along_one(LAW, [0.8 * REACH])
     worn = replace(LAW, friction=0.2)
     response = worn.respond(loaded.state, np.zeros((1, 1)))
     assert response.force[0, 0] == pytest.approx(0.2 * 60.0 * np.tanh(0.8) + 900.0 * 0.8 * REACH)

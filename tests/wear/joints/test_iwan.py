@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from tests.wear.joints.friction_paths import lead_along_one
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
@@ -30,14 +31,8 @@ class MasingJenkins(MasingLaw):
         return 0.0, 2.0
 
 
-def lead(law, displacement, state=None, start=0.0):
-    path = np.asarray(displacement, float)[:, None, None]
-    state = law.rest(1) if state is None else state
-    return march_joints(law, state, np.full((1, 1), start), path)
-
-
 def force_at(law, displacement):
-    return lead(law, displacement).force[-1, 0, 0]
+    return lead_along_one(law, displacement).force[-1, 0, 0]
 
 
 @pytest.mark.parametrize("share", [0.2, 1.0, 1.7, 3.0])
@@ -69,7 +64,7 @@ def test_energy_of_the_uniform_loop(share):
         exact = 2.0 * STIFFNESS * amplitude**3 / (3.0 * REACH)
     else:
         exact = 4.0 * LIMIT * (amplitude - 2.0 * REACH / 3.0)
-    lost = lead(UNIFORM, [amplitude, -amplitude, amplitude]).dissipated
+    lost = lead_along_one(UNIFORM, [amplitude, -amplitude, amplitude]).dissipated
     assert lost[1:].sum() == pytest.approx(exact, rel=1e-12)
     # First loading dissipates a quarter of a loop.
     assert lost[0, 0] == pytest.approx(exact / 4.0, rel=1e-12)
@@ -98,15 +93,18 @@ def test_four_parameters_are_segalmans(chi, beta):
 
 def test_four_parameters_hold_the_uniform_joint():
     path = np.random.default_rng(RNG_SEED).uniform(-2.0, 2.0, 60) * REACH
-    uniform = lead(UNIFORM, path)
-    same = lead(FourParameterIwan(*COMMON, chi=0.0, beta=0.0), path)
+    uniform = lead_along_one(UNIFORM, path)
+    same = lead_along_one(FourParameterIwan(*COMMON, chi=0.0, beta=0.0), path)
     np.testing.assert_allclose(same.force, uniform.force, atol=1e-12 * LIMIT)
     np.testing.assert_allclose(same.dissipated, uniform.dissipated, atol=1e-12 * LIMIT * REACH)
 
 
 def test_jenkins_as_a_masing_law():
     path = np.random.default_rng(RNG_SEED).uniform(-1.5, 1.5, 400) * LIMIT / STIFFNESS
-    masing, direct = lead(MasingJenkins(*COMMON), path), lead(Jenkins(*COMMON), path)
+    masing, direct = (
+        lead_along_one(MasingJenkins(*COMMON), path),
+        lead_along_one(Jenkins(*COMMON), path),
+    )
     scale = LIMIT**2 / STIFFNESS
     np.testing.assert_allclose(masing.force, direct.force, atol=1e-11 * LIMIT)
     np.testing.assert_allclose(masing.dissipated, direct.dissipated, atol=1e-11 * scale)
@@ -126,7 +124,7 @@ def sliders(law, number):
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_many_sliders_approach_the_law_at_second_order(law):
     path = np.random.default_rng(RNG_SEED).uniform(-1.2, 1.2, 60) * REACH
-    by_law = lead(law, path)
+    by_law = lead_along_one(law, path)
     errors = []
     for number in (250, 2000):
         stiffness, reach = sliders(law, number)
@@ -153,26 +151,26 @@ def test_many_sliders_approach_the_law_at_second_order(law):
 def test_closed_loops_are_forgotten(law):
     a = REACH * np.array([0.9, -0.6, 0.5, -0.2, 0.3, 0.0])
     # Go through the nested loops and out of all of them again, past the first turning point.
-    inner = lead(law, [*a, a[4], a[2], a[0], 1.1 * REACH])
-    outer = lead(law, [1.1 * REACH])
+    inner = lead_along_one(law, [*a, a[4], a[2], a[0], 1.1 * REACH])
+    outer = lead_along_one(law, [1.1 * REACH])
     np.testing.assert_allclose(inner.force[-1], outer.force[-1], rtol=1e-13)
     np.testing.assert_allclose(inner.force[6:9, 0, 0], inner.force[[4, 2, 0], 0, 0], rtol=1e-13)
-    after = lead(law, [0.2 * REACH], inner.state, 1.1 * REACH)
-    plain = lead(law, [0.2 * REACH], outer.state, 1.1 * REACH)
+    after = lead_along_one(law, [0.2 * REACH], inner.state, 1.1 * REACH)
+    plain = lead_along_one(law, [0.2 * REACH], outer.state, 1.1 * REACH)
     np.testing.assert_allclose(after.force, plain.force, rtol=1e-13)
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_ring_down_is_remembered_to_the_last_turning_point(law):
     turns = 0.7 * REACH * (-1.0) ** np.arange(3001) * np.linspace(1.0, 0.001, 3001)
-    down = lead(law, turns)
+    down = lead_along_one(law, turns)
     assert down.state.shape[1] < 2 * (2 * 3001 + 10)
     # Out again through every turning point but the innermost, where it is.
-    out = lead(law, turns[-2::-1], down.state, turns[-1])
+    out = lead_along_one(law, turns[-2::-1], down.state, turns[-1])
     np.testing.assert_allclose(out.force, down.force[-2::-1], rtol=1e-12, atol=1e-12 * LIMIT)
-    closed = lead(law, [0.71 * REACH], out.state, turns[0])
+    closed = lead_along_one(law, [0.71 * REACH], out.state, turns[0])
     assert closed.force[-1, 0, 0] == pytest.approx(force_at(law, [0.71 * REACH]), rel=1e-13)
-    settled = lead(law, np.tile([-REACH, REACH], 10), closed.state, 0.71 * REACH)
+    settled = lead_along_one(law, np.tile([-REACH, REACH], 10), closed.state, 0.71 * REACH)
     assert settled.state.shape[1] < 100
 
 
@@ -180,11 +178,11 @@ def test_ring_down_is_remembered_to_the_last_turning_point(law):
 def test_new_parameters_find_the_turning_points_where_they_were(law):
     path = np.random.default_rng(RNG_SEED).uniform(-0.9, 0.9, 30) * REACH
     worn = replace(law, stiffness=1.3 * STIFFNESS, normal_load=0.6 * LOAD)
-    changed = worn.respond(lead(law, path).state, np.zeros((1, 1)))
-    always = lead(worn, path)
+    changed = worn.respond(lead_along_one(law, path).state, np.zeros((1, 1)))
+    always = lead_along_one(worn, path)
     np.testing.assert_allclose(changed.force, always.force[-1], rtol=1e-12)
     next_path = np.random.default_rng(RNG_SEED + 1).uniform(-2.0, 2.0, 30) * REACH
-    ahead = lead(worn, next_path, changed.state, path[-1])
-    expected = lead(worn, next_path, always.state, path[-1])
+    ahead = lead_along_one(worn, next_path, changed.state, path[-1])
+    expected = lead_along_one(worn, next_path, always.state, path[-1])
     np.testing.assert_allclose(ahead.force, expected.force, rtol=1e-12)
     np.testing.assert_allclose(ahead.dissipated, expected.dissipated, atol=1e-12 * LIMIT * REACH)

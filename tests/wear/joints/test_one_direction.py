@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.wear.joints.friction_paths import lead_along_one
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
@@ -37,12 +38,6 @@ def tolerance(law):
     return STEPPING if law is LAWS["bouc-wen, general"] else ROUNDING
 
 
-def lead(law, displacement, state=None, start=0.0):
-    path = np.asarray(displacement, float)[:, None, None]
-    state = law.rest(1) if state is None else state
-    return march_joints(law, state, np.full((1, 1), start), path)
-
-
 def force_after(law, state, increment):
     return law.respond(state, np.full((1, 1), increment)).force[0, 0]
 
@@ -55,7 +50,7 @@ def force_after(law, state, increment):
 )
 def test_tangent_is_the_slope_of_the_force(law, history):
     """The path leads from a state both ways, and next to every transition."""
-    state = lead(law, np.array(history) * REACH).state
+    state = lead_along_one(law, np.array(history) * REACH).state
     start = history[-1] * REACH
     # Loops close where they turned or opposite the first turn; sliders slip, and ξ passes 0,
     # somewhere on a fine grid that meets none of these points itself.
@@ -79,7 +74,7 @@ def test_tangent_is_the_slope_of_the_force(law, history):
 @EVERY
 def test_tangent_after_a_step_too_small_to_see(law):
     """Right after a reversal everything sticks again; continued, the slope is the one before."""
-    state = lead(law, [0.5 * REACH]).state
+    state = lead_along_one(law, [0.5 * REACH]).state
     on = law.respond(state, np.full((1, 1), 1e-12 * REACH)).tangent[0, 0, 0]
     back = law.respond(state, np.full((1, 1), -1e-12 * REACH)).tangent[0, 0, 0]
     here = (force_after(law, state, 1e-6 * REACH) - force_after(law, state, 0.0)) / (1e-6 * REACH)
@@ -93,7 +88,7 @@ def test_tangent_after_a_step_too_small_to_see(law):
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(path=PATHS)
 def test_energy_is_never_gained(law, path):
-    history = lead(law, np.array(path) * REACH)
+    history = lead_along_one(law, np.array(path) * REACH)
     assert np.all(history.dissipated >= 0.0)
     assert np.all(np.isfinite(history.force))
     assert np.all(np.abs(history.force[:, 0, 0] - 900.0 * np.array(path) * REACH) <= LIMIT * 1.0001)
@@ -103,12 +98,12 @@ def test_energy_is_never_gained(law, path):
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(path=PATHS, shares=st.lists(st.floats(0.01, 0.99), min_size=1, max_size=4))
 def test_a_straight_path_may_be_divided(law, path, shares):
-    whole = lead(law, np.array(path) * REACH)
+    whole = lead_along_one(law, np.array(path) * REACH)
     starts, ends = np.array([0.0, *path[:-1]]), np.array(path)
     stops = np.append(np.sort(shares), 1.0)
     # Close to its end (1 - share) start + share end would round differently from the path itself.
     points = [np.append(a + stops[:-1] * (b - a), b) for a, b in zip(starts, ends, strict=True)]
-    parts = lead(law, np.concatenate(points) * REACH)
+    parts = lead_along_one(law, np.concatenate(points) * REACH)
     lost = parts.dissipated[:, 0].reshape(len(path), -1).sum(axis=1)
     allowed = tolerance(law) * len(path)
     np.testing.assert_allclose(parts.force[:: -len(stops)], whole.force[::-1], atol=allowed * LIMIT)
@@ -120,7 +115,7 @@ def test_a_straight_path_may_be_divided(law, path, shares):
 def test_energy_lost_in_a_loop_is_its_area(law, amplitude):
     """The area is integrated between the corners of the loop, independently of increments."""
     amplitude = amplitude * REACH
-    settled = lead(law, np.tile([-amplitude, amplitude], 60))
+    settled = lead_along_one(law, np.tile([-amplitude, amplitude], 60))
     points, weights = np.polynomial.legendre.leggauss(40)
     state, area, lost = settled.state, 0.0, 0.0
     for start, end in ((amplitude, -amplitude), (-amplitude, amplitude)):
@@ -175,7 +170,7 @@ def test_joints_side_by_side_are_joints_alone(law):
     together = march_joints(several, several.rest(4), np.zeros((4, 1)), path.transpose(0, 2, 1))
     for j in range(4):
         alone = replace(law, normal_load=loads[j], friction=frictions[j])
-        single = lead(alone, path[:, 0, j])
+        single = lead_along_one(alone, path[:, 0, j])
         np.testing.assert_array_equal(together.force[:, j], single.force[:, 0])
         np.testing.assert_array_equal(together.dissipated[:, j], single.dissipated[:, 0])
     amplitudes = np.array([1.0, 2.0, 3.0, 4.0]) * REACH
@@ -195,7 +190,7 @@ def test_no_joints_at_all(law):
 
 @EVERY
 def test_a_state_is_left_as_it_was(law):
-    state = lead(law, np.array([0.8, -0.5, 0.1]) * REACH).state
+    state = lead_along_one(law, np.array([0.8, -0.5, 0.1]) * REACH).state
     before = state.copy()
     first = law.respond(state, np.full((1, 1), -2.0 * REACH))
     np.testing.assert_array_equal(state, before)
@@ -206,7 +201,7 @@ def test_a_state_is_left_as_it_was(law):
 
 @EVERY
 def test_an_increment_of_nothing_changes_nothing(law):
-    path = lead(law, np.array([0.8, -0.5, 0.1]) * REACH)
+    path = lead_along_one(law, np.array([0.8, -0.5, 0.1]) * REACH)
     still = law.respond(path.state, np.zeros((1, 1)))
     np.testing.assert_array_equal(still.force, path.force[-1])
     np.testing.assert_array_equal(still.state, path.state)

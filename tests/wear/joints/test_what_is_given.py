@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sa_solver import InputError
+from tests.given import NO_NUMBERS, assert_refused, held_otherwise, spoilt
 from wear.joints import (
     ArrheniusEvolution,
     BoucWen,
@@ -60,18 +61,9 @@ ENTRIES = {
     "spring": (LOADS, lambda k: marched(PolynomialSpring(k))),
     "stop": (1e-4 * LOADS, lambda gap: marched(ElasticStop(1e4, gap))),
     "worn": (1e-5 * LOADS, lambda d: marched(FrictionContact(1e4, 2e4, 0.5, 100.0).worn(d))),
-    "several": (
-        LOADS,
-        lambda load: marched(MixedLaw([JointGroup(Jenkins(1e4, 0.5, load), 2)])),
-    ),
-    "path": (
-        STEPS,
-        lambda u: march_joints(SLIDER, SLIDER.rest(2), np.zeros((2, 1)), u).dissipated,
-    ),
-    "begin": (
-        STEPS[0],
-        lambda u: march_joints(SLIDER, SLIDER.rest(2), u, STEPS).force,
-    ),
+    "several": (LOADS, lambda load: marched(MixedLaw([JointGroup(Jenkins(1e4, 0.5, load), 2)]))),
+    "path": (STEPS, lambda u: march_joints(SLIDER, SLIDER.rest(2), np.zeros((2, 1)), u).dissipated),
+    "begin": (STEPS[0], lambda u: march_joints(SLIDER, SLIDER.rest(2), u, STEPS).force),
     "increment": (STEPS[0], lambda u: SLIDER.respond(SLIDER.rest(2), u).force),
     "state": (
         np.array([[0.01, 0.002], [0.02, 0.001]]),
@@ -111,10 +103,7 @@ ENTRIES = {
     "exponential": (ENERGIES, ExponentialEvolution(0.5, -1e-6)),
     "table": (ENERGIES, TabulatedEvolution((0.0, 1e6), (0.5, 0.7))),
     "places of a table": (ENERGIES, lambda e: TabulatedEvolution(e, (1.0, 2.0, 3.0))(2e6)),
-    "evolution": (
-        ENERGIES,
-        lambda e: JointEvolution(friction=RISING).at(SLIDER, e).friction,
-    ),
+    "evolution": (ENERGIES, lambda e: JointEvolution(friction=RISING).at(SLIDER, e).friction),
     "cycles": (ENERGIES, TEST.energy_at),
     "energies": (ENERGIES, TEST.cycles_at),
     "breaks": (ENERGIES, lambda b: long_test(lambda e: 1.0, 100.0, breaks=b).energy),
@@ -133,13 +122,10 @@ def test_numbers_count_and_not_how_they_are_held(entry):
     field, made = ENTRIES[entry]
     field = field.astype(np.float32).astype(np.float64)
     expected = made(field)
-    longer = np.repeat(field, 2, axis=-1)[..., ::2]
-    unmasked = np.ma.array(field, mask=False)
-    for given in (field.tolist(), field.astype(np.float32), np.asfortranarray(field), longer):
-        np.testing.assert_allclose(made(given), expected, rtol=1e-12, atol=1e-15)
-    found = made(unmasked)
-    assert type(found) is np.ndarray
-    np.testing.assert_array_equal(found, expected)
+    for given in held_otherwise(field):
+        found = made(given)
+        assert type(found) is np.ndarray
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize("entry", ["slider", "spread", "contact", "logarithm", "energies"])
@@ -159,22 +145,14 @@ def test_what_is_no_field_of_numbers_is_refused(entry, kind):
         return  # those of an iteration, which looks at them itself
     if kind == "missing" and entry in ("parallel", "mixed", "basis", "weights"):
         return
-    given = {
-        "complex": field + 0j,
-        "text": field.astype(str),
-        "flags": field > 0.0,
-        "none": None,
-        "masked": np.ma.array(field, mask=field == field.max()),
-        "missing": np.where(field == field.max(), np.nan, field),
-        "deep": field[None],
-    }[kind]
+    given = spoilt(field, kind)
     with pytest.raises(InputError):
         made(given)
 
 
-@pytest.mark.parametrize("value", [np.nan, "100", [[100.0]], True, np.ma.masked, 1j, None])
+@pytest.mark.parametrize("value", [*NO_NUMBERS, None])
 def test_what_is_no_number_is_refused(value):
-    for attempt in (
+    attempts = (
         lambda: Jenkins(value, 0.5, 100.0),
         lambda: BoucWen(1e4, 0.5, 100.0, sigma=value),
         lambda: FourParameterIwan(1e4, 0.5, 100.0, chi=value),
@@ -187,9 +165,8 @@ def test_what_is_no_number_is_refused(value):
         lambda: long_test(lambda energy: 1.0, 10.0, start=value),
         lambda: JointGroup(SLIDER, value),
         lambda: PeriodicMarch(SLIDER, threads=value),
-    ):
-        with pytest.raises(InputError):
-            attempt()
+    )
+    assert_refused(InputError, attempts)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ its places.
 """
 
 import math
+from contextlib import suppress
 from typing import Literal, get_origin
 
 import pytest
@@ -81,8 +82,23 @@ def test_wrong_type_is_refused(entries, folders):
             values += ["3", "true", "' '", r'"a\nb"', "[a]"]
         elif leaf.field.annotation is bool:
             values += ["1", "yes", "[true]"]
+        elif get_origin(leaf.field.annotation) is Literal:
+            values += ["zzz"]
         for value in values:
             refused(leaf, folders, value)
+
+
+def test_lists_hold_something_unless_they_may_be_empty(folders):
+    empty = set()
+    for leaf in LEAVES:
+        if leaf.is_list:
+            with suppress(CaseError):
+                load(leaf, folders, f"{leaf.key}=[]")
+                empty.add(leaf.key)
+    assert empty == {
+        *("assumed", "structure.loads.0.free", "structure.retained", "loops.harmonics"),
+        *("force_sweeps", "at"),
+    }
 
 
 @each_section

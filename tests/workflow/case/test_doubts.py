@@ -43,21 +43,10 @@ LEGS = "[{P: 50 kN, shift_x: 25 um}, {shift_x: -25 um}, {shift_x: 25 um}]"
 SLIPS = [
     # A unit forgotten, or another than was meant.
     ("dovetail", "materials.blade.young=210 MPa", "210 MPa; usual: 0.3 to 1300 GPa; 210 GPa meant"),
-    ("dovetail", "materials.blade.young=0.115", "0.115 MPa; usual"),
-    ("dovetail", "materials.blade.poisson=0.03", "0.03; usual: 0.1 to 0.5; 0.3 meant?"),
-    ("dovetail", "materials.disk.density=4.43e-9 kg/m^3", "4.43e-09 t/mm³ meant?"),
     ("dovetail", "materials.disk.density=4.43 kg/m^3", "500 to 23000 kg/m³; 4.43 g/cm³ meant?"),
-    ("dovetail", "materials.disk.yield_stress=0.9 MPa", "0.9 GPa meant?"),
     ("dovetail", "friction.coefficient=1.5", "friction.coefficient: 1.5; usual: 0.02 to 1.2"),
-    ("dovetail", "friction.coefficient=0.004", "0.04 meant?"),
     ("joint", "joint.friction=9", "9 % meant?"),
-    ("dovetail", "load_path.rotation_speed=6000 rad/s", "6000 rpm meant?"),
-    ("dovetail", "load_path.airfoil_mass=0.8 t", "800 kg; usual: 0.005 to 100 kg; 0.8 kg meant?"),
-    ("dovetail", "load_path.airfoil_mass=0.8 g", "0.8 kg meant?"),
     ("dovetail", "wear.blade.coefficient=0.5 mm^3/J", "5e+08 µm³/J; usual: 1 to 1e+07 µm³/J"),
-    ("dovetail", "wear.blade.coefficient=1e-14", "0.01 µm³/J; usual"),
-    ("dovetail", "stress.life.depth=1.5 mm", "1.5 µm meant?"),
-    ("bodies_wear", "load_path.stroke=50", "50 µm meant?"),
     ("bodies_wear", "structure.radius=1 um", "1 mm meant?"),
     # Loads against what carries them.
     ("dovetail", "load_path.airfoil_mass=80 kg", "load_path: presses with"),
@@ -74,10 +63,7 @@ SLIPS = [
     ("bodies", "contact.grid=[512, 16]", "32 times longer than wide"),
     ("dovetail", "wear.step.cycles=1e6", "1e+06 cycles, of 300000 in all: one jump"),
     ("dovetail", "structure.edge_radius=30 m", "edge_width 1.5 mm falls off by 37.5 nm"),
-    ("dovetail", "structure.neck_fillet=3 um", "3 µm; usual: 0.05 to 100 mm; 3 mm meant?"),
-    ("dovetail", "mesh.size=5 m", "5000 mm; usual: 0.05 to 100 mm"),
     ("dovetail", "load_path.aerodynamic_moment=30 kN*m", "would lift the blade off a flank"),
-    ("specimens", "structure.diameter=8 m", "8000 mm; usual: 0.5 to 500 mm; 8000 µm meant?"),
     # Contacts and their grids, shear and friction.
     ("bodies", "contact.size=[1 m, 1 m]", "cells of 7.81 mm, but the contact is about"),
     ("bodies_wear", "contact.size=[1 um, 1 um]", "contact.size: 1 µm, but the contact is about"),
@@ -86,14 +72,9 @@ SLIPS = [
     ("bodies", "load_path={legs: [{P: 400 N}, {Qx: 15 mN}]}", "Qx up to 15 mN, where friction"),
     ("bodies_wear", LIGHT, "Qx up to 1 mN, where friction carries 20 N: is the unit right?"),
     # Rigs: springs, masses and forces, and the modes that they make.
-    ("vibration", "structure.springs=[1.4 kN/um, 273 kN/um]", "273000 kN/mm; usual: 5e-05 to"),
     ("vibration", "structure.masses=[21.2 g, 1.2 g]", "frequencies: no mode of the rig is near"),
     ("vibration", "frequencies=[20 kHz, 400 kHz]", "frequencies: no mode of the rig is near"),
     ("rig", "excitation.frequency=100 kHz", "excitation.frequency: no mode of the rig is near"),
-    ("joint", "joint.stiffness=27.3", "27.3 N/mm; usual: 0.05 to 10000 kN/mm; 27.3 N/um meant?"),
-    ("joint", "drive.stroke=14 mm", "14 mm; usual: 0.0001 to 1 mm; 14 µm meant?"),
-    ("vibration", "forces=[10 kN, 40 kN]", "40 kN; usual: 1e-06 to 20 kN; 40 N meant?"),
-    ("rig", "evolution={friction: {kind: exponential, final: 72, rate: 1}}", "72 % meant?"),
 ]
 
 
@@ -107,8 +88,6 @@ def told_of(kind: str, slip: str, folder: Path) -> list[str]:
 BESIDE = {
     "load_path.stroke=20 mm": ("contact.size=40 mm",),
     "excitation.frequency=100 kHz": ("integration.step=0.1 us",),
-    "joint.stiffness=27.3": ("joint.residual_stiffness=0.88",),
-    "load_path.stroke=50": ("wear.motion=neglect",),
     LIGHT: ("contact.method=full",),
     "contact.size=[1 um, 1 um]": ("wear.motion=neglect",),
 }
@@ -213,14 +192,9 @@ def test_a_check_tells_the_scene_and_doubts_and_still_is_right() -> None:
     ("number", "unit", "said"),
     [
         (115e3, "MPa", "115 GPa"),
-        (4.43e-9, "t/mm^3", "4430 kg/m³"),
         (0.014, "mm", "14 µm"),
         (0.0, "mm", "0 mm"),
-        (0.0, "t/mm^3", "0 kg/m³"),
-        (-30e3, "N*mm", "-30 N·m"),
         (628.318530718, "rad/s", "6000 rpm"),
-        (0.25, "1", "0.25"),
-        (3.0, "mm/s^2", "3 mm/s²"),
     ],
 )
 def test_numbers_are_said_in_plain_units(number: float, unit: str, said: str) -> None:

@@ -88,16 +88,10 @@ def test_templates_are_valid(validator, kind):
     ("kind", "old", "new"),
     [
         ("dovetail", "analysis: wear", "analysis: contact"),
-        ("dovetail", "kind: dovetail", "kind: doevtail"),
-        ("dovetail", "flank_angle: 45 deg", "flank_angle: '45'"),
         ("dovetail", "flank_angle: 45 deg", "flank_angle: 5,3 mm"),
         ("dovetail", "flank_angle: 45 deg", "flank_angel: 45 deg"),
         ("dovetail", "grid: [128, 256]", "grid: [128, 256, 1]"),
-        ("dovetail", "grid: [128, 256]", "grid: [128, 256.5]"),
-        ("dovetail", "law: energy ", "law: work "),
         ("dovetail", "    young: 115 GPa", "    # young: 115 GPa"),
-        ("mesh", "kind: pressure", "kind: presure"),
-        ("mesh", "pressure: 10 MPa", "force: 10 MPa"),
         ("bodies", "shape: sphere", "shape: cylinder"),
         ("bodies", "  radius: 10 mm", "  # radius: 10 mm"),
         ("line", "size: 2 mm", "size: [2 mm, 2 mm]"),
@@ -108,11 +102,8 @@ def test_templates_are_valid(validator, kind):
         ("bodies", "  legs:", "  # legs:"),
         ("joint", "  cycles: 1080000.0", "  # cycles: 1080000.0"),
         ("specimens", "  cycles: 300000.0", "  # cycles: 300000.0"),
-        ("sweep", "design: grid", "design: all"),
         ("sweep", "values: [0.3, 0.4, 0.5]", "value: 0.3"),
-        ("fit_joint", "change: free", "change: fre"),
         ("fit_wear", "law: energy ", "law: archard "),
-        ("fit_profiles", "aligned: false", "aligned: no x"),
     ],
 )
 def test_wrong_files_are_not(validator, kind, old, new):

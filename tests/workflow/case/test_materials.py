@@ -65,14 +65,6 @@ def test_the_case_of_a_run_says_name_and_numbers(dovetail_path):
     assert parse_case(text, "dump") == case
 
 
-def test_a_check_says_name_and_numbers(dovetail_path):
-    outline = load_case(dovetail_path, ["materials.disk=100Cr6"]).outline()
-    assert (
-        "material",
-        "disk: 100Cr6, young 210 GPa, poisson 0.3, density 7830 kg/m³",
-    ) in outline
-
-
 def test_a_contact_takes_what_it_needs():
     case = load_case(CASES / "sphere_normal.yaml", ["materials.body_1=316L"])
     assert case.materials.body_1.model_dump() == {

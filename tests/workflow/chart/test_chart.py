@@ -10,7 +10,6 @@ import pytest
 
 from sa_solver.types import Grid
 from tests.marks import slow
-from tests.workflow.output.figure_checks import problems
 from workflow.analyses.wear.approximations.approximation import Approximation, Rung
 from workflow.analyses.wear.approximations.convergence import richardson
 from workflow.analyses.wear.output.measures import profile_difference
@@ -18,10 +17,9 @@ from workflow.case.text.writing import dump_case
 from workflow.chart import Chart, accuracy_of
 from workflow.chart.axes import AXES, axes_of
 from workflow.chart.costs import Cost, costs, stage_seconds
-from workflow.chart.figures import axis_figure
 from workflow.chart.frontier import Option, cheapest, efficient
 from workflow.chart.ladder import Ladder, Point, judge
-from workflow.chart.report import combination, sentences, write_chart
+from workflow.chart.report import sentences, write_chart
 from workflow.errors import UserError
 from workflow.kinds import load_case
 from workflow.shell.output.summary import number_at
@@ -212,22 +210,6 @@ def charted(accuracy: float) -> Chart:
     return Chart("Test", (judge(GRID, second_order(), {"volume": 2.0}, {}), method), accuracy)
 
 
-def test_sentences_say_what_to_take():
-    grid, method, together = sentences(charted(0.1))
-    assert grid.startswith("grid: for 10 % take fine: 10 s, 100 convolutions, error 5 % (volume)")
-    assert method.startswith("method: for 10 % take own: 2 s, 20 convolutions, error 0.1 % (depth)")
-    assert "take grid fine, method own: errors, each axis varied alone, add up to 5.1 %" in together
-    assert "about 2 times the seconds" in together
-
-
-def test_sentences_say_when_nothing_is_enough():
-    grid, method, together = sentences(charted(1e-3 / 2))
-    assert "no rung is known to be enough: the best, fine, is within 5 %" in grid
-    assert "take full: 9 s, 90 convolutions, the reference, by definition" in method
-    assert "no choice of rungs is known to be enough" in together
-    assert combination(charted(1e-3 / 2)) is None
-
-
 @pytest.mark.slow
 def test_files_of_a_chart(tmp_path: Path):
     written = write_chart(charted(0.1), tmp_path)
@@ -252,28 +234,6 @@ def test_figures_of_odd_ladders(tmp_path: Path):
     assert (tmp_path / "figures" / "chart_grid.png").exists()
     assert sentences(chart)[1] == "method: nothing ran"
     assert json.loads((tmp_path / "summary.json").read_text("utf-8"))["together"] is None
-
-
-def test_names_of_a_crowded_chart_leave_each_other_room():
-    """The case as written and efficient points are labelled first; labels cover no line."""
-    crowd = [(f"rung {k:02}", 1.0 + k, 0.2 + 0.01 * (k % 7), 9.0 + k) for k in range(20)]
-    alone, finer, finest = (
-        ("own", None, 0.05, 30.0),
-        ("finer", 0.1, 1e-3, 90.0),
-        ("0", 0.05, 0, 300),
-    )
-    points = [
-        point(name, step, {"depth": 1.0 + error}, seconds)
-        for name, step, error, seconds in (alone, *crowd, finer, finest)
-    ]
-    ladder = judge(GRID, points, {}, {})
-    figure = axis_figure(ladder, 0.01)
-    assert not problems(figure)
-    for axis in figure.axes:
-        names = {text.get_text() for text in axis.texts}
-        assert {"own", *(rung.name for rung in ladder.rungs if rung.by_seconds)} <= names
-        assert len(names) < 23
-        assert 30.0 * (1.0 if axis is figure.axes[0] else 10.0) not in axis.lines[0].get_xdata()
 
 
 # --- measures -----------------------------------------------------------------------------------

@@ -95,9 +95,7 @@ def chart(case: Path, out: Path, *options: str) -> Result:
 # --- a contact whose errors are known -----------------------------------------------------------
 
 
-def test_grids_of_a_sphere_go_to_hertz_at_second_order(
-    ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_grids_of_a_sphere_go_to_hertz_at_second_order(ball, tmp_path, monkeypatch):
     run = in_process(lambda job, folder: run_case(job.load(), folder, force=True))
     monkeypatch.setattr(workflow.chart.run, "run_jobs", run)
     result = chart(ball, tmp_path / "out", "--axis", "grid", "--accuracy", "0.1 %")
@@ -210,12 +208,7 @@ class MadeUp:
 
 
 def made_up(
-    monkeypatch: pytest.MonkeyPatch,
-    case: Path,
-    out: Path,
-    *,
-    limit: float = 1e3,
-    **settings: Any,
+    monkeypatch: pytest.MonkeyPatch, case: Path, out: Path, *, limit: float = 1e3, **settings: Any
 ) -> tuple[MadeUp, dict[str, Ladder]]:
     """Return the ladders of artificial runs, by axis."""
     runs = MadeUp(limit)
@@ -224,9 +217,7 @@ def made_up(
     return runs, {ladder.axis.name: ladder for ladder in charted.ladders}
 
 
-def test_every_different_case_runs_once_and_the_own_one_first(
-    small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_every_different_case_runs_once_and_the_own_one_first(small_path, tmp_path, monkeypatch):
     chosen = {"axes": ("grid", "stepper", "dimension", "method")}
     runs, ladders = made_up(monkeypatch, small_path, tmp_path, **chosen)
     assert runs.ran[0].name == "own"
@@ -241,9 +232,7 @@ def test_every_different_case_runs_once_and_the_own_one_first(
         assert (case.output.figures, case.stress.wanted, case.fidelity) == (False, False, "fixed")
 
 
-def test_increments_that_are_auto_are_chosen_once(
-    small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_increments_that_are_auto_are_chosen_once(small_path, tmp_path, monkeypatch):
     """They stay the same on the rungs of other axes."""
     auto = {"axes": ("increments", "mesh"), "overrides": ("load_path.increments=auto",)}
     runs, ladders = made_up(monkeypatch, small_path, tmp_path, **auto)
@@ -256,9 +245,7 @@ def test_increments_that_are_auto_are_chosen_once(
 
 
 @pytest.mark.slow
-def test_quantities_of_wear_and_what_they_cost(
-    small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_quantities_of_wear_and_what_they_cost(small_path, tmp_path, monkeypatch):
     _, ladders = made_up(monkeypatch, small_path, tmp_path, axes=("grid", "method", "stepper"))
     grid = ladders["grid"]
     # Nothing wears of body 2, so that nothing is relative to it.
@@ -278,9 +265,7 @@ def test_quantities_of_wear_and_what_they_cost(
     assert ladders["method"].cheapest(1.0) is None
 
 
-def test_dimensions_are_compared_in_the_middle(
-    small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_dimensions_are_compared_in_the_middle(small_path, tmp_path, monkeypatch):
     _, ladders = made_up(monkeypatch, small_path, tmp_path, axes=("dimension",))
     two, three = ladders["dimension"].rungs
     assert set(two.values) == {"middle.intrados.depth_1", "middle.intrados.area_1"}
@@ -290,19 +275,13 @@ def test_dimensions_are_compared_in_the_middle(
 
 
 @pytest.mark.slow
-def test_explicit_steps_that_take_too_long_are_left_out(
-    small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_explicit_steps_that_take_too_long_are_left_out(small_path, tmp_path, monkeypatch):
     runs, ladders = made_up(monkeypatch, small_path, tmp_path, axes=("stepper",), limit=5.0)
-    assert ladders["stepper"].failed == {
-        "explicit, 0.9 of its limit": "it would take 6.7e+03 steps of 4.5 cycles"
-    }
+    assert list(ladders["stepper"].failed) == ["explicit, 0.9 of its limit"]
     assert not any("explicit" in job.name for job in runs.ran)
 
 
-def test_quantities_can_be_picked(
-    small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_quantities_can_be_picked(small_path, tmp_path, monkeypatch):
     settings = {"axes": ("grid",), "quantities": ("intrados.volume_1",)}
     _, ladders = made_up(monkeypatch, small_path, tmp_path / "a", **settings)
     assert list(ladders["grid"].references) == ["intrados.volume_1"]

@@ -155,17 +155,9 @@ GOOD = "displacement [um],force [N]\n" + "".join(f"{k % 7},{k % 5}\n" for k in r
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        ("", [], ":1: no rows"),
         ("displacement [um]\n1\n", [], "no column force"),
         ("displacement [um]|force [N]\n1|2\n", [], "this file has 'displacement [um]|force [N]'"),
-        ("displacement [um],force [N]\n", [], "no rows"),
-        ("displacement [N],force [N]\n1,2\n", [], "displacement"),
-        ("displacement [furlongz],force [N]\n1,2\n", [], ":1: displacement"),
         ("displacement,displacement,force\n1,2,3\n", [], "given twice"),
-        ("displacement,force\n1,2\n\n1,2,3\n", [], ":4: 3 values; allowed: 2"),
-        ("displacement,force\n1,two\n", [], ":2: force: 'two': not a number"),
-        ("displacement,force\n1,nan\n", [], "finite"),
-        ("displacement,force\n1,1_000\n", [], "1_000"),
         ("displacement,force\n1,2\n1,2\n", [], "never changes"),
         (GOOD, ["--normal-load", "60 mm"], "--normal-load 60 mm"),
         (GOOD, ["--normal-load", "heavy"], "such as 60 N"),

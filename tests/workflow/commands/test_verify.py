@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from tests.marks import slow
 from workflow.cli import cli
 from workflow.errors import UserError
 from workflow.kinds import load_case
@@ -25,6 +26,20 @@ def verify(path, out):
 def quiet(text):
     """Return the case without its pictures."""
     return text.replace("figures: true", "figures: false")
+
+
+# The first takes a second; others are long.
+VERIFIED = (
+    *("bolted_joint_test4", "bolted_joint_test2", "rig_bouc_wen", "rig_reduced", "rig_force_75N"),
+    *("rig_hammer_7N", "rig_hammer_60N", "sphere_normal", "sphere_fretting", "sphere_torsion"),
+    *("line_bulk_stress", "line_dissimilar", "cylinder_wear", "sphere_wear"),
+    *("specimens_flat", "specimens_curved"),
+)
+
+
+@pytest.mark.parametrize("name", [VERIFIED[0], *map(slow, VERIFIED[1:])])
+def test_shipped_cases_meet_their_expectations(name, tmp_path):
+    assert verification.verify_cases((CASES / f"{name}.yaml",), tmp_path)
 
 
 @pytest.mark.slow

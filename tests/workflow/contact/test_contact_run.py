@@ -109,16 +109,6 @@ def test_increment_that_does_not_converge_ends_the_run_and_keeps_the_others(
     assert invoke("resume", out).exit_code == 0
 
 
-def test_border_and_yield_are_warned_of(solver, small, tmp_path):
-    solver(states(12, border_load=0.01, traction=np.full((3, 32, 32), 950.0)))
-    done = invoke("run", small, "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.stderr
-    border, pressure = summary_of(tmp_path / "out")["warnings"]
-    assert "touches the border" in border
-    assert "raise contact.size" in border
-    assert "reaches 950 MPa, above the yield stress of 900 MPa" in pressure
-
-
 UNLIKE = """\
 title: Rigid ball on rubber
 analysis: contact
@@ -282,16 +272,3 @@ assert not {{"gmsh", "skfem", "meshio"}} & set(sys.modules)
 
 
 # --- shipped cases ------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    ["sphere_normal", "sphere_fretting", "sphere_torsion", "line_bulk_stress", "line_dissimilar"],
-)
-def test_shipped_case_meets_its_expectations(whole, name, tmp_path):
-    text = (CASES / f"{name}.yaml").read_text(encoding="utf-8")
-    path = tmp_path / f"{name}.yaml"
-    path.write_text(f"{text}\noutput: {{paraview: false, figures: false}}\n", encoding="utf-8")
-    done = invoke("verify", path, "--out", tmp_path / "out")
-    assert done.exit_code == 0, (done.stdout, done.stderr)

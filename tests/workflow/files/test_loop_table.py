@@ -65,10 +65,7 @@ def test_measured_tables_may_have_units_of_their_own(tmp_path):
         ("", ":1: no rows; allowed: a header"),
         ("energy,P,kt,mu\n", ":1: no rows"),
         ("energy,P,kt,mu,colour\n0,1,1,1,1\n", "'colour': unknown column; allowed: cycles, energy"),
-        (
-            "energy,P,kt\n0,1,1\n",
-            "no column mu; this file has 'energy', 'P', 'kt'; allowed: at least energy, P",
-        ),
+        ("energy,P,kt\n0,1,1\n", "no column mu; this file has 'energy', 'P', 'kt'; allowed: at"),
         ("energy,P,kt,mu,mu\n0,1,1,1,1\n", ":1: mu: column given twice"),
         ("energy,P,kt [s],mu\n0,1,1,1\n", "kt: unit 's' cannot be converted to N/mm"),
         ("energy [J/mm],P,kt,mu\n0,1,1,1\n", "energy: unit 'J/mm' cannot be converted"),

@@ -26,11 +26,7 @@ def bound(path):
         one.bind(str(path))
 
 
-SPECIAL = {
-    "pipe": os.mkfifo,
-    "device": lambda path: path.symlink_to("/dev/zero"),
-    "socket": bound,
-}
+SPECIAL = {"pipe": os.mkfifo, "device": lambda path: path.symlink_to("/dev/zero"), "socket": bound}
 
 
 @pytest.fixture(params=SPECIAL)

@@ -89,10 +89,7 @@ def forces(path):
         ("# nothing\n\ntime,force\n", ":3: no rows"),
         ("# a\ntime\n1\n", ":2: no column force; this file has 'time'; allowed: both"),
         ("time,force,force\n1,2,3\n", ":1: force: column given twice; allowed: once"),
-        (
-            "time,force [s]\n1,2\n",
-            ":1: force: unit 's' cannot be converted to N; allowed: N, or",
-        ),
+        ("time,force [s]\n1,2\n", ":1: force: unit 's' cannot be converted to N; allowed: N, or"),
         ("time,force\n1,2\n#\n\n1,2,3\n", ":5: 3 values; allowed: 2, as the header"),
         ("time,force\n1,two\n", ":2: force: 'two': not a number; allowed: numbers"),
         ("time\tforce\n1,5\t2,5\n", ":2: force: 2,5: a decimal comma; allowed: a point"),

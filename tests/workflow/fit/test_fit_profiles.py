@@ -110,12 +110,7 @@ def test_coefficients_of_both_bodies_come_back_through_closed_forms(folder, monk
         ("scan.csv", "x [mm]", "x", "scan.csv:1: 'x': no unit; allowed: one in brackets"),
         ("scan.csv", "depth_1 [um]", "depth_1 [MPa]", "scan.csv:1: depth_1: unit 'MPa' cannot"),
         ("scan.csv", "\n-0.6882353", "\n-0.8", "scan.csv:3: x: -0.8: does not rise; allowed: rows"),
-        (
-            "scan.csv",
-            "depth_1",
-            "height",
-            "scan.csv:1: none of the columns depth, depth_1, depth_2",
-        ),
+        ("scan.csv", "depth_1", "height", "scan.csv:1: none of the columns depth, depth_1,"),
         ("fit.yaml", "finer: {wear.step.cycles: 5e4}", "finer: {}", "fit.yaml:4: finer"),
         ("fit.yaml", "case: test.yaml", "case: no.yaml", "no such file"),
         ("test.yaml", "law: energy", "law: archard", "test.yaml"),

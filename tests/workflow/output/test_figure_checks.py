@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 import pytest
 from matplotlib import rc_context
 from matplotlib.figure import Figure
@@ -25,7 +24,6 @@ from workflow.analyses.wear.figures.wear import figures_of
 from workflow.analyses.wear.output.layout import WearContents
 from workflow.chart import figures as chart_figures
 from workflow.commands import loops_figure
-from workflow.pictures.fitting import broken
 from workflow.pictures.panels import change, changes, plain_ticks
 from workflow.pictures.style import DOTS_PER_INCH, STYLE
 from workflow.sweep import figures as sweep_figures
@@ -89,13 +87,7 @@ def many(path: Path, shape: tuple[int, int]) -> Path:
     ],
     ids=["slot", "square", "wide and long names", "five"],
 )
-def test_figures_of_wear(
-    size: tuple[float, float],
-    names: tuple[str, ...],
-    shape: tuple[int, int],
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
+def test_figures_of_wear(size, names, shape, monkeypatch, tmp_path):
     path, contents = scene(monkeypatch, tmp_path / "results.h5", size, names, shape)
     drawn = figures_of(contents)
     # Those of many faces take long.
@@ -109,24 +101,6 @@ def change_results(path: Path, how: Callable[[h5py.File], Any]) -> Path:
     with h5py.File(path, "a") as file:
         how(file)
     return path
-
-
-def keep_middle(file: h5py.File) -> None:
-    """Reduce contacts to 2 % of their grids."""
-    for contact in file["contact"].values():
-        for jump in conftest.CONTENTS.jump_names:
-            field = contact[jump]["pressure"]
-            some = np.zeros(field.shape)
-            some[10:13, 18:24] = field[10:13, 18:24]
-            field[...] = some
-
-
-def test_small_contacts_fill_their_maps(results: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "results.h5"
-    copy.write_bytes(results.read_bytes())
-    change_results(copy, keep_middle)
-    with h5py.File(copy) as file:
-        assert wrong(figures_of(conftest.CONTENTS)["pressure_maps"](file)) == []
 
 
 def test_nothing_dissipated_has_no_panel_and_no_percentage(results: Path, tmp_path: Path) -> None:
@@ -177,12 +151,6 @@ def test_figures_of_sweeps_charts_and_loops() -> None:
     assert [what for figure in drawn for what in wrong(figure)] == []
 
 
-def test_words_are_broken_where_they_can_be() -> None:
-    assert broken("of many words", 8) == "of many\nwords"
-    assert broken(LONG, 20) == "fir_tree_lobe_1_\npressure_side_\nleading_edge"
-    assert broken("unbreakable", 4) == "unbr\neaka\nble"
-
-
 def test_changes_from_nearly_nothing_are_told_in_their_unit() -> None:
     assert change(2.0, 3.0, "mJ") == "+50.0%"
     assert change(1e-6, 3.0, "mJ") == "1e-06 → 3 mJ"
@@ -202,4 +170,3 @@ def test_logarithmic_axes_have_a_few_numbers(ends: tuple[float, float]) -> None:
     labels = [*axis.get_xticklabels(), *axis.get_xticklabels(minor=True)]
     shown = [t for t in labels if t.get_text() and ends[0] <= t.get_position()[0] <= ends[1]]
     assert 2 <= len(shown) <= 9
-    assert wrong(figure) == []

@@ -78,9 +78,7 @@ def test_flank_sits_at_its_place(results: Path, folder: Path, name: str) -> None
 
 @pytest.mark.parametrize("name", INTERFACES)
 @pytest.mark.parametrize("jump", ["00000", "00004"])
-def test_flank_fields_are_those_of_the_run(
-    results: Path, folder: Path, name: str, jump: str
-) -> None:
+def test_flank_fields_are_those_of_the_run(results, folder, name, jump):
     mesh, shape = flank(folder, name, jump)
     with h5py.File(results) as file:
         grid, frame = grid_and_frame(file, name)
@@ -183,9 +181,7 @@ def worn_volume(surface: pv.PolyData, frame: Frame) -> float:
 
 
 @pytest.mark.parametrize("name", INTERFACES)
-def test_worn_surface_covers_the_flank_and_holds_the_worn_volume(
-    results: Path, folder: Path, name: str
-) -> None:
+def test_worn_surface_covers_the_flank_and_holds_the_worn_volume(results, folder, name):
     with h5py.File(results) as file:
         grid, frame = grid_and_frame(file, name)
         heights = file["surfaces"][name]["00006"]["body_1"][()]
@@ -207,9 +203,7 @@ def test_worn_surface_covers_the_flank_and_holds_the_worn_volume(
 
 
 @pytest.mark.parametrize(("body", "outward"), [("disk", 1.0), ("blade", -1.0)])
-def test_worn_surfaces_face_each_other(
-    results: Path, folder: Path, body: str, outward: float
-) -> None:
+def test_worn_surfaces_face_each_other(results, folder, body, outward):
     with h5py.File(results) as file:
         _, frame = grid_and_frame(file, "intrados")
     surface = pv.read(folder / f"flank_intrados_{body}.stl")

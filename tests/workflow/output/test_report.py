@@ -19,7 +19,7 @@ from workflow.analyses.time.outcome import MotionContents as TimeContents
 from workflow.analyses.vibration.output.outcome import VibrationContents as VibrationContents
 from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents as WornContents
 from workflow.analyses.wear.output.layout import WearContents as WearContents
-from workflow.case.text.readable import percent, readable
+from workflow.case.text.readable import readable
 from workflow.case.text.typeset import exact_percent, given, number, typeset
 from workflow.errors import UserError
 from workflow.pictures.drawing import write_figures
@@ -243,11 +243,6 @@ def test_numbers_are_told_as_people_read_them(number, text):
     assert str(readable(*number)) == text
 
 
-def test_shares_have_two_digits():
-    told = [percent(share) for share in (0.0, 1e-9, 3.1e-4, 0.0123, 0.152, 2.0)]
-    assert told == ["0 %", "< 0.01 %", "0.03 %", "1.2 %", "15 %", "200 %"]
-
-
 TYPESET = [
     ("-3.5 um at [-1, 1], (-2)", "−3.5 µm at [−1, 1], (−2)"),
     ("1e+06 N and 1.3e-05 mm^2", "10⁶ N and 1.3·10⁻⁵ mm²"),
@@ -290,12 +285,6 @@ def test_warnings_that_places_share_are_told_once():
     assert told.count("too coarse by −1 µm") == 1
     assert "the half-space under 17 N; the half-space under 87 N" in told
     assert "<strong>left</strong>: worn through" in told
-
-
-def test_no_number_of_a_page_has_a_hyphen_for_minus(drawn):
-    page = Page((drawn / "report.html").read_text("utf-8"))
-    for heading in ("What was computed", "Results", "The case"):
-        assert not re.search(r"(?<![\w.\])-])-\d", page.told[heading])
 
 
 def test_an_axis_is_not_filled_by_noise():

@@ -266,19 +266,6 @@ def test_added_masses_do_not_turn(two):
 # --- told and refused ---------------------------------------------------------------------------
 
 
-def test_check_tells_what_the_matrices_are(two):
-    np.savez(two / "two.npz", K=STIFF, M=MASS, F=np.eye(2), Q=np.eye(2))
-    (two / "case.yaml").write_text(OWN, encoding="utf-8")
-    checked = command("check", two / "case.yaml", overrides=["structure.driven={load: 2}"])
-    assert checked.exit_code == 0
-    rows = dict(line.strip().split(maxsplit=1) for line in checked.stdout.splitlines()[1:])
-    assert rows["matrices"] == "stiffness K, mass M, loads F; not taken: Q"
-    assert rows["unknowns"] == "2 of 2 points: block, holder"
-    assert rows["mass"] == "21 kg along x, of all points moved as one"
-    assert rows["load"] == "2, with forces of 1, 0, 0 along x, y, z in all for a force of 1"
-    assert rows["modes"] == "lowest without joints, masses and springs: 34.73, 2306.4 Hz"
-
-
 def test_units_that_are_hardly_meant_are_doubted(two):
     (two / "case.yaml").write_text(OWN, encoding="utf-8")
     checked = command("check", two / "case.yaml", overrides=[IN_METRES.replace("kN", "GN")])
@@ -291,18 +278,15 @@ def test_units_that_are_hardly_meant_are_doubted(two):
 @pytest.mark.parametrize(
     ("override", "words"),
     [
-        ("structure.matrices={units: {length: mm, force: N}}",
-         "structure.matrices.file: missing; allowed: a file of all, or stiffness and mass"),
+        ("structure.matrices={units: {length: mm, force: N}}", "structure.matrices.file: missing;"),
         ("structure.matrices.units={length: mm, force: mm}", "cannot be converted"),
         ("structure.matrices.units={length: mm}", "units.force: missing"),
         ("structure.matrices.unknowns=two.npz", "not a file of this kind"),
-        ("structure.matrices.stiffness=two.npz:Kred",
-         "{folder}/two.npz: Kred: no such matrix; allowed: one of K"),
+        ("structure.matrices.stiffness=two.npz:Kred", "{folder}/two.npz: Kred: no such matrix;"),
         ("structure.matrices.file=gone.mat", "no such file"),
         ("structure.modes=3", "3: given without retained"),
         ("structure.retained=[tip]", "missing; allowed: with retained"),
-        ("structure.joints.0.points=tip",
-         "'tip': no such point; allowed: block, holder"),
+        ("structure.joints.0.points=tip", "'tip': no such point; allowed: block, holder"),
         ("structure.seen.points=pad", "'pad': no such point"),
         ("structure.driven={load: 2}", "2: no such load; allowed: 1 to 1"),
     ],

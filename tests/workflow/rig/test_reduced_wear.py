@@ -32,7 +32,6 @@ from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import ReducedWearCase
 from workflow.analyses.vibration_wear.nodes_run import resonance_that_wears
 from workflow.analyses.vibration_wear.pads import WearingPads, worn_model
-from workflow.case.text.writing import dump_case
 from workflow.kinds import parse_case
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import Reporter
@@ -408,14 +407,6 @@ def test_a_run_leaves_nodes_in_tables_results_and_paraview(ended):
         np.testing.assert_allclose(face[f"worn_{body} [mm]"], worn, rtol=1e-6)
 
 
-def test_a_case_is_written_as_it_was_read(folder):
-    case = case_of(folder)
-    assert parse_case(dump_case(case), str(folder / "again.yaml")) == case
-    rows = dict(case.outline())
-    assert rows["pressed"] == "holder along -z"
-    assert rows["nodes"] == "nodes.csv"
-
-
 # --- refusals ------------------------------------------------------------------------------------
 
 
@@ -425,10 +416,7 @@ def test_a_case_is_written_as_it_was_read(folder):
         (["joint.nodes="], "joint.area: missing; allowed: area of all contacts together"),
         (["joint.area=1 mm^2"], "given beside areas in"),
         (["joint.pressed="], "without pressed, so that each contact carries a load"),
-        (
-            ["wear.frequency="],
-            "wear.frequency=: missing; allowed: frequency, or at_resonance: true",
-        ),
+        (["wear.frequency="], "wear.frequency=: missing; allowed: frequency, or at_resonance:"),
         (["wear.at_resonance=true"], "given beside at_resonance"),
         (["wear.body_1.coefficient=0", "wear.body_2.coefficient=0"], "0 for both bodies"),
         (["joint.friction=0"], "joint.friction"),

@@ -63,10 +63,7 @@ def test_a_point_is_refused(tmp_path):
     assert done.exit_code == 2
     line = done.stderr.splitlines()[-1]
     assert "contact.grid: the contact is only 2 x 2 cells across" in line
-    assert (
-        "finer cells are needed than those of contact.grid: [200, 200] or contact.size: [0.32 mm"
-        in line
-    )
+    assert "finer cells are needed than those of contact.grid: [200, 200] or contact.size:" in line
 
 
 def test_a_contact_that_fills_its_grid_needs_more_cells_there():

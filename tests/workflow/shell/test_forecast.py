@@ -64,12 +64,8 @@ def test_what_an_earlier_run_left_tells_nothing_of_the_rest(clock: Clock) -> Non
     ("seconds", "told"),
     [
         (0.0, "a few seconds"),
-        (6.0, "5 s"),
         (17.0, "20 s"),
-        (59.0, "1 min"),
-        (12.4 * 60.0, "12 min"),
         (48.0 * 60.0, "50 min"),
-        (3590.0, "1 h"),
         (26.0 * 3600.0, "25 h"),
         (60.0 * 3600.0, "2 days"),
     ],
@@ -88,19 +84,7 @@ def test_a_forecast_is_told_once_and_again_where_it_changes(clock: Clock, tmp_pa
             reporter.reached(step / 10.0, f"step {step}")
     told = [line[9:] for line in (tmp_path / "log").read_text().splitlines()]
     # 9 steps of 60 s and 30 s; after the seventh 3 of 150 s and 30 s, 1440 s in place of 630.
-    assert told == [
-        "wear, step 1: about 10 min to go",
-        "wear, step 7: about 8 min to go",
-    ]
-
-
-def test_short_runs_are_not_forecast(clock: Clock, tmp_path: Path) -> None:
-    reporter = Reporter(tmp_path / "log")
-    with reporter.course("wear"):
-        for share in (0.2, 0.4):
-            clock.now += 1.5
-            reporter.reached(share)
-    assert (tmp_path / "log").read_text() == ""
+    assert told == ["wear, step 1: about 10 min to go", "wear, step 7: about 8 min to go"]
 
 
 def test_a_first_step_may_be_loading(clock: Clock, tmp_path: Path) -> None:
@@ -112,31 +96,6 @@ def test_a_first_step_may_be_loading(clock: Clock, tmp_path: Path) -> None:
             reporter.reached(step / 1000.0, f"step {step}")
     told = (tmp_path / "log").read_text()[9:]
     assert told == "motions, step 17: about 1 min to go\n"
-
-
-@pytest.mark.parametrize(("rate", "told"), [(1e-5, "3 min"), (5e-2, "40 s")])
-def test_of_little_work_it_is_told_what_was_expected(
-    clock: Clock, tmp_path: Path, rate: float, told: str
-) -> None:
-    """200 s are expected: 2e-5 of the work in 2 s (28 h) counts little, a tenth in 20 s a lot."""
-    reporter = Reporter(tmp_path / "log", expected=RunTime(course=200.0, after=0.0))
-    with reporter.course("motions"):
-        for step in (1, 2, 3):
-            clock.now += 1.0
-            reporter.reached(rate * step)
-    lines = (tmp_path / "log").read_text().splitlines()
-    assert lines[0][9:] == f"motions: about {told} to go", lines
-
-
-def test_what_comes_after_is_as_slow_as_what_came_before(clock: Clock, tmp_path: Path) -> None:
-    """The start takes 40 s instead of 7 + 3 s, so the end takes 20 + 80 s, not 20 s."""
-    reporter = Reporter(tmp_path / "log", expected=RunTime(before=7.0, after=20.0))
-    clock.now += 40.0
-    with reporter.course("wear"):
-        for step in (1, 2):
-            clock.now += 20.0
-            reporter.reached(step / 2.0)
-    assert (tmp_path / "log").read_text()[9:] == "wear: about 2 min to go\n"
 
 
 def test_parts_share_the_work_of_what_is_around_them(clock: Clock, tmp_path: Path) -> None:
@@ -175,9 +134,7 @@ SHORT = ["output.figures=false", "output.paraview=false"]
         slow("specimens_coarse.yaml", [], r"specimens, [\d.]+ N"),
     ],
 )
-def test_runs_of_every_kind_tell_how_far_they_are(
-    every_step: None, tmp_path: Path, name: str, settings: list[str], told: str
-) -> None:
+def test_runs_of_every_kind_tell_how_far_they_are(every_step, tmp_path, name, settings, told):
     out = tmp_path / "out"
     settings = [*settings, *(SHORT if "paraview" in (CASES / name).read_text() else SHORT[:1])]
     done = command("run", CASES / name, "--out", out, overrides=settings)
@@ -308,10 +265,3 @@ def test_a_rig_does_not_know_more_than_the_wear_that_it_waits_for() -> None:
     assert waited.unknown
     assert (waits.assumed, waits.unknown) == (waited.assumed, waited.unknown)
     assert waits.before >= waited.seconds
-
-
-def test_check_says_how_long() -> None:
-    checked = command("check", CASES / "dovetail.yaml")
-    assert re.search(
-        r"^  time +about 1 min, within a factor of five$", checked.stdout, re.MULTILINE
-    )

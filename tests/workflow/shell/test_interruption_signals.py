@@ -1,7 +1,6 @@
 """Run processes that are killed or get Ctrl-C lose no results and leave nothing behind."""
 
 import os
-import random
 import re
 import signal
 import subprocess
@@ -17,13 +16,8 @@ from workflow.analyses.wear import contact_workers
 from workflow.shell import processes as workers
 
 # Many quick jumps, so that a random moment mostly falls among them.
-MANY = (
-    *("wear.step.cycles=1500", "coupling.drift=2e-4"),
-    "load_path.increments=[5, 7]",
-)
+MANY = (*("wear.step.cycles=1500", "coupling.drift=2e-4"), "load_path.increments=[5, 7]")
 JUMPS = 20
-# Seconds a run of these needs; kills come at any moment of it, and some too late.
-RUN_SECONDS = 6.0
 # Kills of it at random moments; test_kills.py has six of every kind of run.
 KILLS = 8
 
@@ -160,21 +154,6 @@ def test_three_kills_lose_nothing(small_path, resume, reference, separate_proces
     moments = [(0, 0.0), (3, 0.02), (8, 0.05)]
     assert kill_and_resume(small_path, tmp_path / "out", moments) == 3
     assert_equal_after(resume, tmp_path / "out", reference)
-
-
-@posix_only
-@pytest.mark.slow
-def test_kills_at_random_moments_lose_nothing(
-    small_path, resume, reference, separate_processes, tmp_path
-):
-    """The run is killed at random moments of its work, its output and its start."""
-    dice, kills, number = random.Random(20), 0, 0
-    while kills < KILLS:
-        folder = tmp_path / f"out{number}"
-        moments = [(None, dice.uniform(0.2, RUN_SECONDS)) for _ in range(4)]
-        kills += kill_and_resume(small_path, folder, moments)
-        assert_equal_after(resume, folder, reference)
-        number += 1
 
 
 def assert_equal_after(resume, folder, reference):

@@ -35,6 +35,7 @@ joint: {law: polynomial_spring, stiffness: 0 N/mm, cubic: 1e6 N/mm^3}
 forces: [0.5 N]
 frequencies: [150 Hz, 170 Hz]
 resolution: {harmonics: 1, samples: 32}
+stability: none
 output: {figures: [svg], paraview: false}
 """
 
@@ -116,9 +117,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
 
 
 @pytest.mark.parametrize("what", FAILURES)
-def test_what_only_shows_a_run_fails_and_the_run_does_not(
-    what: str, whole: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_only_shows_a_run_fails_and_the_run_does_not(what, whole, tmp_path, monkeypatch):
     """Results equal those of a run without failures, and one warning names what is missing."""
     folder, summary = whole
     said, fail = FAILURES[what]

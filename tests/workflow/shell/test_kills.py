@@ -97,16 +97,10 @@ RUNS = {
     # Probe runs are computed in a worker process, which runs in tests do without.
     "wear": LongRun(
         BALL,
-        (
-            "wear.step={kind: implicit, cycles: 100}",
-            "contact.grid=[48, 48]",
-            "error_budget=known",
-        ),
+        ("wear.step={kind: implicit, cycles: 100}", "contact.grid=[48, 48]", "error_budget=known"),
     ),
     "body wear": LongRun(
-        BODY,
-        (IN_TEXT, "wear.frequency=", "wear.at_resonance=true", "wear.force=20 N"),
-        as_texts(),
+        BODY, (IN_TEXT, "wear.frequency=", "wear.at_resonance=true", "wear.force=20 N"), as_texts()
     ),
     "pad wear": LongRun(PADS_THAT_WEAR, ("forces=[20 N]",), (("specimens.yaml", SPECIMENS),)),
 }

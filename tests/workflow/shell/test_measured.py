@@ -109,11 +109,7 @@ def test_table_is_read_in_its_units_with_deviations(tmp_path: Path) -> None:
     ("text", "wrong"),
     [
         ("at,values\n10,3\n", "t.csv:1: 'values': no unit"),
-        ("at,values [N]\n10,3\n", "t.csv:1: values: unit 'N' cannot be converted to mm"),
-        ("at,values [um]\n10,nan\n", "t.csv:2: values: nan: not a finite number"),
-        ("at,depth [um]\n10,3\n", "t.csv:1: no column values"),
         ("at,values [um],values_deviation [um]\n1,3,1\n2,3,0\n", "t.csv:3: values_deviation: 0"),
-        ("at,values [um]\n", "t.csv:1: no rows"),
     ],
 )
 def test_bad_tables_are_refused_with_their_line(tmp_path: Path, text: str, wrong: str) -> None:

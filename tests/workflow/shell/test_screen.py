@@ -15,7 +15,6 @@ from tests.marks import slow
 from workflow.cli import TO_TRY, cli
 from workflow.commands.group import LISTED
 from workflow.runs.first_look import first_look
-from workflow.shell.run_time import RunTime
 from workflow.shell.terminal import screen
 from workflow.shell.terminal.reporter import LINE, Reporter
 from workflow.shell.terminal.screen import Loudness
@@ -41,9 +40,7 @@ def without_times(lines: list[str]) -> list[str]:
         (Loudness.VERBOSE, ["a line", "a detail", "warning: too coarse", "mesh: ... s"]),
     ],
 )
-def test_the_log_has_all_however_quiet_it_is(
-    loudness: Loudness, heard: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_log_has_all_however_quiet_it_is(loudness, heard, tmp_path, capsys):
     said_by(Reporter(tmp_path / "log", loudness=loudness))
     assert without_times(capsys.readouterr().err.splitlines()) == heard
     logged = [line[9:] for line in (tmp_path / "log").read_text("utf-8").splitlines()]
@@ -69,9 +66,7 @@ def terminal(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     return shown.getvalue
 
 
-def test_a_stage_shows_how_far_it_is(
-    terminal: Callable[[], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stage_shows_how_far_it_is(terminal, tmp_path, monkeypatch):
     monkeypatch.setattr("workflow.shell.terminal.reporter.LOOK", -1.0)
     reporter = Reporter(tmp_path / "log")
     with reporter.stage("condensation", "bodies") as told:
@@ -81,17 +76,6 @@ def test_a_stage_shows_how_far_it_is(
     (row,) = {line for line in terminal().splitlines() if "1 of 2 bodies" in line}
     assert "condensation" in row
     assert "more" in row
-
-
-def test_a_long_part_is_forecast_before_any_of_it_is_done(
-    terminal: Callable[[], str], tmp_path: Path
-) -> None:
-    """5 min of wear and 1 min after it are expected, scaled as the start took longer."""
-    reporter = Reporter(tmp_path / "log", expected=RunTime(course=300.0, after=60.0))
-    with reporter.course("wear"):
-        reporter._screen._rows.refresh()
-    reporter.close()
-    assert "about 6 min to go" in terminal()
 
 
 def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_path: Path) -> None:
@@ -105,30 +89,14 @@ def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_p
     assert "…" in terminal()
 
 
-@pytest.mark.parametrize("terminal", [40], indirect=True)
-def test_a_narrow_terminal_tells_how_far_it_is_and_no_more(terminal: Callable[[], str]) -> None:
-    """In 40 columns a bar and a forecast would leave no room for it."""
-    rows = screen.Screen(on=True)
-    with rows.row("condensation") as row:
-        row.show(0.4, "2 of 5 steps", "about 20 min more")
-        rows._rows.refresh()
-    rows.close()
-    (line,) = {line for line in terminal().splitlines() if "2 of 5 steps" in line}
-    assert "condensation" in line
-
-
-def test_a_terminal_that_only_prints_is_told_by_lines(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_terminal_that_only_prints_is_told_by_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     for kind, shows_rows in {"dumb": False, "xterm": True}.items():
         console = Console(file=io.StringIO(), force_terminal=True, _environ={"TERM": kind})
         monkeypatch.setattr(screen, "console", lambda console=console: console)
         assert screen.Screen(on=True).on is shows_rows
 
 
-def test_where_there_is_no_terminal_a_line_now_and_then(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_where_there_is_no_terminal_a_line_now_and_then(tmp_path, monkeypatch, capsys):
     """1000 nodes in ten minutes give ten lines."""
     now = [100.0]
     monkeypatch.setattr("time.perf_counter", lambda: now[0])
@@ -160,10 +128,6 @@ def test_a_run_tells_where_to_look_first(tmp_path: Path) -> None:
     ]
 
 
-def test_a_run_without_pictures_tells_its_folder(tmp_path: Path) -> None:
-    assert list(first_look(tmp_path, [])) == [f"done: {tmp_path}"]
-
-
 def to_try() -> list[list[str]]:
     lines = [line.strip().partition("   ")[0] for line in TO_TRY.splitlines()]
     return [line.split()[1:] for line in lines if line.startswith("fretscale ")]
@@ -178,9 +142,7 @@ def test_without_arguments_it_says_what_to_try() -> None:
 
 
 @slow
-def test_what_it_says_to_try_works_and_leaves_a_picture(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_it_says_to_try_works_and_leaves_a_picture(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for arguments in to_try():
         assert CliRunner().invoke(cli, arguments).exit_code == 0, arguments

@@ -103,10 +103,7 @@ def test_the_runs_are_the_best_values_and_pairs_beside_them(tmp_path):
     ("text", "words"),
     [
         ("fit: fit.json\nsamples: 9\n", "samples: not for design: linear"),
-        (
-            "vary: {friction.coefficient: {values: [0.3]}}\n",
-            "vary.friction.coefficient: in design: linear; allowed: a distribution of kind normal",
-        ),
+        ("vary: {friction.coefficient: {values: [0.3]}}\n", "vary.friction.coefficient: in"),
     ],
 )
 def test_what_has_no_first_order_is_refused(tmp_path, text, words):

@@ -23,6 +23,7 @@ structure: {kind: rig, masses: [20 kg, 1 kg], springs: [1 N/um, 200 N/um], dampi
 joint: {law: jenkins, normal_load: 100 N, friction: 0.5, stiffness: 10 N/um}
 forces: [2 N, 60 N]
 frequencies: [20 Hz, 300 Hz]
+stability: none
 output: {figures: false}
 """
 ONE_MASS = """\
@@ -33,6 +34,7 @@ joint: {law: jenkins, normal_load: 10 N, friction: 0.5, stiffness: 1500, residua
 forces: [10 N]
 frequencies: [80 Hz, 200 Hz]
 resolution: {harmonics: 1, samples: 4096}
+stability: none
 output: {figures: false}
 """
 STIFFNESS = 1e4
@@ -173,26 +175,22 @@ def test_files_of_a_run(tmp_path):
     ("override", "words"),
     [
         ("forces=[40 N, 10 N]", "forces=[40 N, 10 N]: not ascending"),
-        ("forces=[]", "forces"),
         ("frequencies=[400 Hz, 20 Hz]", "not ascending"),
         ("mass=3", "no such mass; allowed: 1 to 2"),
-        ("structure.kind=joint", "allowed: rig, reduced, matrices, points, friction_rig"),
         (
             "joint={law: friction_contact, normal_load: 1, friction: 0.5, stiffness: 1, "
             "normal_stiffness: 1}",
             "in a reduced structure or a friction_rig",
         ),
         ("loops={frequency: 10 Hz}", "outside; allowed: within frequencies, 20 to 300 Hz"),
-        ("loops={frequency: 100 Hz, harmonics: [0]}", "out of range"),
         ("continuation.first_step=0.5", "not between the shortest and the longest step"),
-        ("continuation.largest_angle=120 deg", "above 0 to 90 deg"),
         ("resolution.harmonics=[1, 1]", "not ascending"),
         ("resolution.harmonics=[3, 5]", "1 among them"),
+        ("resolution.samples=30", "too few for harmonic 15; allowed: above 30"),
+        ("assumed=[drive]", "no such entry"),
+        ("loops={frequency: 100 Hz, harmonics: [0]}", "out of range"),
         ("resolution.harmonics=[1, 2.5]", "not all of them harmonics"),
         ("resolution.harmonics=0", "out of range"),
-        ("resolution.samples=30", "too few for harmonic 15; allowed: above 30"),
-        ("resolution.tolerance=50 %", "out of range"),
-        ("assumed=[drive]", "no such entry"),
     ],
 )
 def test_mistakes_are_told_in_one_line(tmp_path, override, words):
@@ -207,7 +205,7 @@ def test_new_writes_a_case_that_runs(tmp_path):
     case = parse_case(path.read_text(encoding="utf-8"), str(path))
     assert isinstance(case, VibrationCase)
     assert tuple(case.resolution.harmonics) == (1, 3, 5, 7, 9, 11, 13, 15)
-    settings = ("--set", "forces=[10 N]", "--set", "output.figures=false")
+    settings = ("--set", "frequencies=[95 Hz, 100 Hz]", "--set", "output.figures=false")
     assert invoke("run", path, "--out", tmp_path / "out", *settings).exit_code == 0
 
 

@@ -150,14 +150,8 @@ def test_what_is_no_ring_is_refused(tmp_path, settings, message):
     ("settings", "message"),
     [
         (["ring="], "structure.joints.0.points: 'next blade': no such point; allowed: disk, blade"),
-        (
-            ["ring.faces=[{points: disk, next_points: rim}]"],
-            "ring.faces.0.next_points: 'rim': no such point; allowed: disk, blade",
-        ),
-        (
-            ["ring.faces=[{points: disk, next_points: blade}]"],
-            "structure.springs.1.points: 'next disk': no such point",
-        ),
+        (["ring.faces=[{points: disk, next_points: rim}]"], "ring.faces.0.next_points: 'rim': no"),
+        (["ring.faces=[{points: disk, next_points: blade}]"], "structure.springs.1.points: 'next"),
     ],
 )
 def test_places_that_a_sector_has_not_are_refused(tmp_path, settings, message):

@@ -22,10 +22,8 @@ from wear.steps.step_errors import ErrorControl
 from wear.steps.steppers import first_cycles
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
-from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.vibrating_contact import VibratingContact
-from workflow.case.text.writing import dump_case
-from workflow.kinds import load_case, parse_case
+from workflow.kinds import load_case
 from workflow.models.vibration.excitation import Driving
 
 WEAR = """\
@@ -298,18 +296,6 @@ def test_figures_are_drawn(ended, tmp_path):
     told = ANALYSIS.pictures, VibrationWearContents(at_nodes=False), ended / "results.h5"
     drawn = {path.stem for path in write_figures(*told, tmp_path)}
     assert drawn == {"frequency_response", "evolution", "scar", "loops"}
-
-
-def test_a_case_is_written_as_it_was_read(tmp_path):
-    (tmp_path / "wear.yaml").write_text(WEAR, encoding="utf-8")
-    case = parse_case(RIG, str(tmp_path / "rig.yaml"))
-    assert isinstance(case, VibrationWearCase)
-    assert parse_case(dump_case(case), str(tmp_path / "again.yaml")) == case
-    rows = dict(case.outline())
-    assert rows["worn by"] == "75 N at 100 Hz"
-    assert rows["states"].endswith("20,000 cycles")
-    assert rows["contact"] == "that of wear.yaml, pressed by 60 N"
-    assert {"shape", "material", "friction", "grid", "wear law"} <= rows.keys()
 
 
 # --- mistakes -----------------------------------------------------------------------------------

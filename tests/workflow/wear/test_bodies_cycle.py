@@ -177,9 +177,7 @@ def cycle_energy(case: BodiesWearCase, parts: int = 1) -> float:
 @pytest.mark.parametrize(
     ("legs", "whole", "accuracy"), [(TURNING, 0.06, 0.05), slow(RISING, 0.5, 0.02)]
 )
-def test_increments_are_split_until_they_leave_the_accuracy(
-    legs: str, whole: float, accuracy: float
-) -> None:
+def test_increments_are_split_until_they_leave_the_accuracy(legs, whole, accuracy):
     """The template's increments, one per leg, have a far larger error."""
     case = area(legs, *COARSE, f"contact.accuracy={accuracy}")
     many = cycle_energy(case, 16)

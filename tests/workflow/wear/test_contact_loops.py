@@ -16,9 +16,7 @@ from tests.workflow.conftest import CONTENTS, Run, invoke
 from tests.workflow.shell.interruptions import ctrl_c_after_jumps
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
-from workflow.analyses.wear.figures import loops as loops_figure
 from workflow.analyses.wear.figures import wear as figures
-from workflow.analyses.wear.output.layout import WearContents
 from workflow.analyses.wear.output.loop_table import COLUMNS
 from workflow.analyses.wear.worn.contact_loops import (
     MEASURED,
@@ -218,23 +216,6 @@ def test_computed_loops_are_read_as_measured_ones(tmp_path):
     assert kt == pytest.approx(1e-3 / SPHERE.tangential_compliance, rel=0.02)
     assert mu == pytest.approx(0.7, rel=2e-3)
     assert unworn.split()[1:] == worn.split()[1:]
-
-
-def test_figure_shows_the_loops(written, sphere):
-    with h5py.File(written.results) as file:
-        figure = loops_figure.loops(file, WearContents(("sphere",), ("body_1", "body_2"), 1))
-    kt = sphere.values["kt"] * 1e-3
-    assert f"sphere {kt:.4g} → {kt:.4g} N/µm" in figure.get_suptitle()
-    loop, stiffness, friction, energy = figure.axes
-    assert [line.get_label() for line in loop.lines] == ["unworn", "200 cycles"]
-    np.testing.assert_allclose(loop.lines[0].get_xdata(), 1e3 * sphere.displacement)
-    np.testing.assert_allclose(stiffness.lines[0].get_ydata(), [kt, kt])
-    np.testing.assert_allclose(stiffness.lines[0].get_xdata(), [1.5, 1.5])
-    assert "only mobilised" in friction.get_title()  # at half of what friction bears
-    (bars,) = (bars for bars in stiffness.collections)
-    lower, upper = bars.get_segments()[0][:, 1]
-    assert 0.5 * (upper - lower) == pytest.approx(1e-3 * sphere.values["kt_error"])
-    assert energy.get_ylim()[1] > sphere.values["energy_per_loop"]
 
 
 def test_kinetics_show_area_and_the_band_of_the_extrapolation(results, tmp_path):

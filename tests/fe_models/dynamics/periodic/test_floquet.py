@@ -172,10 +172,7 @@ def test_time_integration_on_both_sides_of_a_fold(folded):
         omega = TURN * motion.frequency
         begin = 1.01 * np.array([motion.displacement(1)[0, 0], motion.velocity(1)[0, 0]])
         end = solve_ivp(
-            lambda t, y, w=omega: [
-                y[1],
-                0.3 * np.cos(w * t) - DAMPING * y[1] - y[0] - y[0] ** 3,
-            ],
+            lambda t, y, w=omega: [y[1], 0.3 * np.cos(w * t) - DAMPING * y[1] - y[0] - y[0] ** 3],
             (0.0, 60.0 * TURN / omega),
             begin,
             rtol=1e-9,

@@ -18,9 +18,9 @@ from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
+from tests.fe_models.dynamics.harmonic_rigs import rig
 from tests.marks import slow
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
-from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic.march import SEPARATED, SLIP, STICK, PeriodicMarch
@@ -31,11 +31,6 @@ SAMPLES = 256  # at which motions are compared
 PERIODS = 6  # from rest, before a fixed point is looked for
 SETTLED = 1e-10  # change in a period of a fixed point, over the largest of a state
 WANTED = 1e-4  # agreement of the motions, over the largest displacement
-
-
-def rig(ratio):
-    """Return the rig of the thesis."""
-    return two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), ratio)
 
 
 def fixed_point(period, state):

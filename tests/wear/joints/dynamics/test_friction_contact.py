@@ -259,7 +259,6 @@ def test_energy_lost_is_work_less_what_is_stored(seed):
 
 # --- derivatives ------------------------------------------------------------------------------
 
-ON_CIRCLE = np.array([0.6 * REACH, 0.8 * REACH, 0.0])
 SITUATIONS = {
     "sticks": ([0.1, 0.2, 0.0], [0.2, -0.3, 0.1]),
     "sticks, just": ([0.0, 0.0, 0.0], [0.5999, 0.7999, 0.0]),

@@ -232,10 +232,7 @@ def test_slip_is_of_second_order_in_the_samples(name):
     for count in counts:
         cycle = settle(PRESSED, ORBITS[name], int(count))
         errors.append(
-            [
-                np.abs(cycle.force - fine.force).max(),
-                np.abs(cycle.dissipated - fine.dissipated)[0],
-            ]
+            [np.abs(cycle.force - fine.force).max(), np.abs(cycle.dissipated - fine.dissipated)[0]]
         )
     for order in np.polyfit(np.log(counts), np.log(errors), 1)[0]:
         assert -2.5 < order < -1.7
@@ -272,11 +269,7 @@ CASES = {
     ),
     "slips and turns on the circle": (PRESSED, ORBITS["a circle"], {SLIP}),
     "slips and turns under a load that varies": (PRESSED, ORBITS["a circle, load varies"], {SLIP}),
-    "sticks, slips and turns": (
-        PRESSED,
-        ORBITS["a thin ellipse, load varies"],
-        {STICK, SLIP},
-    ),
+    "sticks, slips and turns": (PRESSED, ORBITS["a thin ellipse, load varies"], {STICK, SLIP}),
     "in every state": (
         PRESSED,
         ORBITS["a figure of eight that lifts off"],

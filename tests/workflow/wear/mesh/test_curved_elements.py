@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fe_models.geometry.imported import read_bodies
-from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import run
 from tests.workflow.wear.mesh.test_curved_mesh import PEAK, pressed
 from workflow.analyses.wear.structures.mesh.case import MeshCase
@@ -18,8 +17,7 @@ pytestmark = [pytest.mark.usefixtures("reads_here")]
 
 
 @pytest.mark.parametrize(
-    ("dimension", "order", "rel"),
-    [(2, 2, 0.015), pytest.param(3, 0, 0.03, marks=pytest.mark.slow)],
+    ("dimension", "order", "rel"), [(2, 2, 0.015), pytest.param(3, 0, 0.03, marks=pytest.mark.slow)]
 )
 def test_hertz_of_curved_elements(tmp_path, dimension: int, order: int, rel: float):
     """A second-order mesh and a CAD file give Hertz; in space four nodes carry the load."""
@@ -27,22 +25,6 @@ def test_hertz_of_curved_elements(tmp_path, dimension: int, order: int, rel: flo
     summary = run(case, tmp_path / "out", "mesh.order=2")
     assert summary["sole"]["peak_pressure"]["unworn"] == pytest.approx(PEAK[dimension], rel=rel)
     assert read_bodies(tmp_path / "out" / "worn.msh").midsides
-
-
-def test_a_check_says_what_is_used_of_midsides(tmp_path):
-    """A file without midside nodes is not mentioned, unless second order is requested."""
-    case = pressed(tmp_path, 2, 1)
-    assert "midside" not in invoke("check", case).output
-    said = " ".join(invoke("check", case, "--set", "mesh.order=2").output.split())
-    assert "foot of order 2, straight: the file has no midside nodes of it" in said
-    (tmp_path / "second").mkdir()
-    case = pressed(tmp_path / "second", 2, 2)
-    said = " ".join(invoke("check", case).output.split())
-    assert "give contact faces their form and nothing else; mesh.order: 2 takes them" in said
-    said = " ".join(invoke("check", case, "--set", "mesh.order=2").output.split())
-    assert "block of order 2, straight: its midside nodes are in the middle of edges" in said
-    assert "foot of order 2, " in said
-    assert "edges curved by up to " in said
 
 
 def test_only_bodies_with_curved_edges_have_midsides(tmp_path):

@@ -72,10 +72,7 @@ def test_cuts_that_do_not_match_run(tmp_path):
         (["structure.contacts.0.face_1=wheel_rim"], "meets a cut"),
         (["structure.loads.2.through=[1, 0, 0]"], "a rotation about another axis"),
         (["structure.loads.0.group=wheel_low"], "wheel_low is on a cut"),
-        (
-            ["structure.supports.0.group=wheel_low"],
-            "supports.0.group=wheel_low: wheel_low is on a cut",
-        ),
+        (["structure.supports.0.group=wheel_low"], "supports.0.group=wheel_low: wheel_low is on a"),
     ],
 )
 def test_wrong_cuts_are_refused(tmp_path, overrides, said):

@@ -317,7 +317,6 @@ def test_slice_in_plane_strain_is_refused(blocks):
     assert "as in a slice in plane strain" in refused(blocks, f"structure.supports={supports}")
 
 
-def test_lists_hold_something(blocks):
-    for name in ("contacts", "supports", "loads"):
-        line = refused(blocks, f"structure.{name}=[]")
-        assert f"structure.{name}=[]: a list of 0: too short; allowed: a list of at least 1" in line
+@pytest.mark.parametrize("name", ["contacts", "supports", "loads"])
+def test_lists_hold_something(blocks, name):
+    assert f"structure.{name}=[]: a list of 0: too short" in refused(blocks, f"structure.{name}=[]")

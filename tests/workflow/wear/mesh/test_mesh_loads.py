@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from sa_solver.half_space.subsurface_influence import YY
-from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import STEEL, refused, run
 from tests.workflow.wear.mesh.plane_blocks import Blocks, solved
 from workflow.analyses.wear.structures.mesh.model import mesh_assembly
@@ -105,20 +104,11 @@ def test_temperatures_of_nodes_that_are_all_alike(heated):
     assert mesh_assembly(load_case(heated, [supports, with_loads(NODAL)])).key != key
 
 
-def test_check_tells_temperatures(heated):
-    told = invoke("check", heated, "--set", with_loads(HEATED, NODAL)).output
-    said = " ".join(told.split())
-    assert "temperature, change 100 K, times (0.5, 1) at the ends of legs" in said
-    assert "nodal temperature, reference 20 K of t.csv" in said
-    assert "120 to 120), times" in said
-
-
 @pytest.mark.parametrize(
     ("load", "wrong"),
     [
         (HEATED | {"body": "lid"}, "structure.loads.1: no body lid; allowed: base, foot"),
         (NODAL | {"file": "u.csv"}, "structure.loads.1.file: 'u.csv': no such file"),
-        (HEATED | {"change": 2e4}, "change: 20000.0: out of range"),
     ],
 )
 def test_temperatures_that_do_not_fit_are_refused(heated, load, wrong):
@@ -130,9 +120,6 @@ def test_temperatures_that_do_not_fit_are_refused(heated, load, wrong):
     [
         ("node,temperature\n1,20\n", "nodes have no temperature, the first is 2"),
         ("node,temperature\n1,20\n1,30\n", "t.csv:3: node: 1: node given twice; allowed: once"),
-        ("node,warmth\n1,20\n", "t.csv:1: 'warmth': unknown column"),
-        ("node,temperature [MPa]\n1,20\n", "t.csv:1: temperature: "),
-        ("node,temperature\n1,nan\n", "t.csv:2: temperature: nan: not a finite number"),
     ],
 )
 def test_files_of_temperatures_that_do_not_fit_are_refused(heated, text, wrong):
@@ -244,11 +231,3 @@ def test_moment_of_a_force_beside_the_contact(blocks, tie):
 )
 def test_motions_of_points_that_do_not_fit_are_refused(blocks, change, wrong):
     assert wrong in refused(blocks, f"structure.loads={json.dumps([DOWN | change])}")
-
-
-def test_check_tells_points(blocks):
-    loads = [DOWN | {"rotation": [0, "0.01 deg", 0], "free": ["x"], "tie": "rigid"}]
-    given = f"structure.loads={json.dumps(loads)}", f"structure.supports={json.dumps(BASE)}"
-    said = " ".join(invoke("check", blocks, "--set", given[0], "--set", given[1]).output.split())
-    assert "remote displacement, displacement (0 mm, 0 mm, -2 µm)" in said
-    assert "on foot_z1 at (1, 0, 8), x free, rigid, times (1, 1)" in said

@@ -52,19 +52,6 @@ def test_a_mesh_in_metres_wears_as_in_millimetres(blocks, tmp_path):
     )
 
 
-def test_sizes_and_their_unit_are_told(blocks, tmp_path):
-    """Check and describe report both bodies, 2 mm wide and 3 mm high."""
-    assert "taken as mm, the file says no unit; bodies within 2 x 2 x 3 mm" in _said(blocks)
-    divided(tmp_path / "blocks.inp", 25.4)
-    inches = _said(blocks, "--set", "structure.length_unit=in")
-    assert "in in, as given, converted to mm; bodies within 2 x 2 x 3 mm" in inches
-    wrong = invoke("describe", tmp_path / "blocks.inp", "--unit", "inch")
-    assert (wrong.exit_code, "allowed: mm, um, cm, m, in, ft" in wrong.stderr) == (2, True)
-    told = invoke("describe", tmp_path / "blocks.inp", "--unit", "in").output
-    assert "lengths in in, as given, converted to mm" in told
-    assert "body Foot-1: 27 nodes, 48 tetrahedra, 1 x 1 x 1 mm, volume 1 mm³" in told
-
-
 def _said(case, *options):
     return " ".join(invoke("check", case, *options).output.split())
 

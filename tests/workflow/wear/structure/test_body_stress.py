@@ -199,10 +199,7 @@ def test_there_is_no_stress_where_the_body_is_not(body) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("settings", "bounds"),
-    [
-        (("mesh.flank_nodes=[20, 34]", "mesh.order=1"), (0.05, 0.06)),
-        ((), (0.025, 0.045)),
-    ],
+    [(("mesh.flank_nodes=[20, 34]", "mesh.order=1"), (0.05, 0.06)), ((), (0.025, 0.045))],
     ids=["20 nodes", "as shipped"],
 )
 def test_a_fine_mesh_finds_the_same_next_to_the_face(settings, bounds) -> None:

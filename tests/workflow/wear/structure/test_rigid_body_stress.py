@@ -26,8 +26,7 @@ MOST_SHEARED = {"sphere": (0.310, 0.48), "cylinder": (0.300, 0.786)}
 
 
 @pytest.mark.parametrize(
-    ("shape", "rigid"),
-    [("sphere", 2), ("cylinder", 1), slow("sphere", 1), slow("cylinder", 2)],
+    ("shape", "rigid"), [("sphere", 2), ("cylinder", 1), slow("sphere", 1), slow("cylinder", 2)]
 )
 def test_the_elastic_body_is_stressed_as_hertz_says(tmp_path: Path, shape: str, rigid: int) -> None:
     """The stress on the axis under pressure agrees from 0.05 to two contact radii of depth.

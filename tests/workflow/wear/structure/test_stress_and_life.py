@@ -20,20 +20,13 @@ from wear.contact.tractions import CycleTractions
 from wear.cracking.bulk_stress import BulkStress
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.stress.body_stress import Planes, StressedBody, StressedCycle
-from workflow.analyses.wear.stress.contact_stress import (
-    _report_carried,
-    _report_stick,
-    life_maps,
-)
+from workflow.analyses.wear.stress.contact_stress import _report_carried, _report_stick, life_maps
 from workflow.shell.output.results import grid_of
 
 FLANKS = ("intrados", "extrados")
 BODIES = {1: "disk", 2: "blade"}
 METAL = Material(115e3, 0.29)
-QUICK = (
-    *("contact.grid=[24, 32]", "wear.cycles=1e4"),
-    "stress={points: 6}",
-)
+QUICK = (*("contact.grid=[24, 32]", "wear.cycles=1e4"), "stress={points: 6}")
 # Of the pressures of one contact problem solved from two different starts.
 SOLVER = 1e-6
 
@@ -74,9 +67,7 @@ def peak_traction(file: h5py.File, flank: str, moment: str) -> Array:
 
 @pytest.mark.parametrize("method", ["normal", slow("full"), "line"])
 @pytest.mark.parametrize("moment", ["unworn", "worn"])
-def test_section_is_that_of_the_recorded_tractions_and_of_the_structure(
-    request: pytest.FixtureRequest, method: str, moment: str
-) -> None:
+def test_section_is_that_of_the_recorded_tractions_and_of_the_structure(request, method, moment):
     """Stress that the structure carries past the contact pulls along its free face."""
     run = request.getfixturevalue(method)
     with h5py.File(run.folder / "results.h5") as file:
@@ -150,9 +141,7 @@ def test_wear_takes_the_peaks_off(normal: Any) -> None:
 
 
 @pytest.mark.parametrize("method", ["normal", slow("full"), "line"])
-def test_friction_parameter_integrates_to_the_energy_of_the_cycle(
-    request: pytest.FixtureRequest, method: str
-) -> None:
+def test_friction_parameter_integrates_to_the_energy_of_the_cycle(request, method):
     run = request.getfixturevalue(method)
     with h5py.File(run.folder / "results.h5") as file:
         for flank in FLANKS:
@@ -308,9 +297,7 @@ def test_switched_off_it_leaves_nothing(start: Any, tmp_path: Path) -> None:
     ],
     ids=["off the grid", "no depth", "line along y"],
 )
-def test_sections_that_cannot_be_are_refused(
-    start: Any, tmp_path: Path, overrides: list[str], words: str
-) -> None:
+def test_sections_that_cannot_be_are_refused(start, tmp_path, overrides, words):
     run = start(tmp_path / "out", *QUICK, *overrides)
     assert run.ending.exit_code == 2
     assert words in " ".join(run.ending.stderr.split())
@@ -329,36 +316,6 @@ def test_section_lies_where_it_says(axis: str) -> None:
 
 
 # --- pictures -----------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["normal", "line"])
-def test_figures_say_what_the_summary_says(request: pytest.FixtureRequest, method: str) -> None:
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    from workflow.analyses.wear.figures import wear as figures
-    from workflow.pictures.style import STYLE
-
-    run = request.getfixturevalue(method)
-    told = {
-        "subsurface_stress": ("von_mises", ".0f"),
-        "fretting_life": ("cracking_parameter", ".3g"),
-    }
-    with h5py.File(run.folder / "results.h5") as file, rc_context(STYLE):
-        drawings = figures.figures_of(contents_of(run.folder))
-        for name, (quantity, digits) in told.items():
-            figure = drawings[name](file)
-            FigureCanvasAgg(figure).draw()
-            for text in [axis._left_title for axis in figure.axes] + [figure._suptitle]:
-                box = text.get_window_extent()
-                assert box.x0 >= 0, text.get_text()
-                assert box.x1 <= figure.bbox.x1, text.get_text()
-            for flank in FLANKS:
-                bodies = run.summary[flank]["stress"][quantity].values()
-                largest = [max(body[m]["value"] for body in bodies) for m in ("unworn", "worn")]
-                text = " → ".join(format(value, digits) for value in largest)
-                assert f"{flank} {text}" in figure.get_suptitle()
 
 
 @pytest.fixture(scope="module")
