@@ -15,7 +15,7 @@ from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.errors import MethodFailed
-from workflow.shell.output.dataset import Dataset
+from workflow.layout.declared import Arrays
 from workflow.shell.terminal.reporter import Reporter
 
 # Error by time steps, as a share of the largest displacement, from which a warning is given.
@@ -72,27 +72,18 @@ def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
     }
 
 
-def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict[str, Dataset]:
+def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> Arrays:
     """Return the curves of a motion."""
-    seen, pull = rig.seen.T, "force of the joint, or the sum of several, resisting"
-    dissipated = motion.energies.joints.sum(axis=1)
-    lost = "energy that the joint has dissipated since the beginning"
     of_entries = {}
     if len(rig.entries) > 1:
         moved, pulled = rig.by_entry(motion)
-        of_each = "of the joints of each entry of structure.joints"
-        of_entries = {
-            "joints_displacement": Dataset(moved, "mm", f"mean displacement {of_each}"),
-            "joints_force": Dataset(pulled, "N", f"sum of the forces {of_each}, resisting"),
-        }
+        of_entries = {"joints_displacement": moved, "joints_force": pulled}
     return {
-        "time": Dataset(motion.times, "s", "time"),
-        "excitation": Dataset(force.value(motion.times), "N", "force of the excitation"),
-        "displacement": Dataset(motion.displacement @ seen, "mm", "displacements of what is seen"),
-        "acceleration": Dataset(
-            motion.acceleration @ seen, "mm/s^2", "accelerations of what is seen"
-        ),
-        "joint_force": Dataset(rig.loop(motion)[1], "N", pull),
+        "time": motion.times,
+        "excitation": force.value(motion.times),
+        "displacement": motion.displacement @ rig.seen.T,
+        "acceleration": motion.acceleration @ rig.seen.T,
+        "joint_force": rig.loop(motion)[1],
         **of_entries,
-        "dissipated": Dataset(dissipated, "N mm", lost),
+        "dissipated": motion.energies.joints.sum(axis=1),
     }

@@ -22,14 +22,13 @@ from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.laws import Laws, grouped, law_of, law_of_all, laws_of
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig
-from workflow.analyses.vibration.case.excitation import FORCE
 from workflow.analyses.vibration.case.load import Driving, driving_of
 from workflow.analyses.vibration.case.ring import frequencies_by_diameters
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.memory import memory
 from workflow.analyses.vibration.output.outcome import RING
 from workflow.errors import MethodFailed
-from workflow.shell.output.dataset import Dataset
+from workflow.layout.declared import Arrays
 from workflow.shell.terminal.reporter import Reporter
 
 # Number of frequencies of the linear limits, in addition to the natural frequencies. Each takes the
@@ -148,31 +147,29 @@ class VibrationModel:
             numbers["joints"] = self.rig.joints
         return numbers
 
-    def diameters(self) -> dict[str, Dataset] | None:
+    def diameters(self) -> Arrays | None:
         """Return natural frequencies by nodal diameters for a sector of a ring, else None."""
         sector = self.rig.sector
         if sector is None:
             return None
         return frequencies_by_diameters(sector, self.rig.stuck(self.law, self.resting))
 
-    def contact(self) -> dict[str, Dataset] | None:
+    def contact(self) -> Arrays | None:
         """Return places of the joints and their state at rest, None if they have no places."""
         rig = self.rig
         if rig.pressing is None:
             return None
         force, closing = self.rest.cycle.samples[0, :, 2], self.rest.coefficients[:, 0, 2]
         return {
-            "x": Dataset(rig.places[:, 0], "mm", "of each joint on the contact plane"),
-            "y": Dataset(rig.places[:, 1], "mm", "of each joint on the contact plane"),
-            "gap": Dataset(rig.gap, "mm", "of the bodies without load"),
-            "area": Dataset(rig.area, "mm^2", "that belongs to each joint"),
-            "normal_force": Dataset(force, "N", "of each joint at rest"),
-            "normal_displacement": Dataset(
-                closing, "mm", "closing of each joint by the load at rest"
-            ),
+            "x": rig.places[:, 0],
+            "y": rig.places[:, 1],
+            "gap": rig.gap,
+            "area": rig.area,
+            "normal_force": force,
+            "normal_displacement": closing,
         }
 
-    def linear(self, span: tuple[float, float]) -> dict[str, Dataset]:
+    def linear(self, span: tuple[float, float]) -> Arrays:
         """Return the linear limits: observed amplitude over force or level, joints free and stuck.
 
         Both are for harmonic 1. The natural frequencies are among the points; without damping,
@@ -187,15 +184,7 @@ class VibrationModel:
         frequency = np.union1d(np.geomspace(*span, points), inside)
         parts = np.array_split(frequency, -(-len(frequency) // AT_ONCE))
         free, stuck = np.concatenate([self._limits(part) for part in parts], axis=1)
-        amount = self.driving.amount
-        unit, _ = amount.receptance
-        first = "" if amount is FORCE else ", of harmonic 1"
-        size = f"amplitude of what is looked at over the {amount.name}{first}"
-        return {
-            "frequency": Dataset(frequency, "Hz", "frequency of the force"),
-            "free": Dataset(free, unit, f"{size}, without the joints"),
-            "stuck": Dataset(stuck, unit, f"{size}, all joints stuck"),
-        }
+        return {"frequency": frequency, "free": free, "stuck": stuck}
 
     def _limits(self, frequency: Array) -> Array:
         """Return amplitudes over force ``(2, f)`` [mm/N], with joints free and stuck."""

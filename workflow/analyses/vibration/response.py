@@ -40,7 +40,7 @@ from workflow.analyses.vibration.output.loops import loops_of
 from workflow.analyses.vibration.output.outcome import DIAMETERS, RESONANCE, Curves, Response
 from workflow.analyses.vibration.stability import stability_along
 from workflow.errors import MethodFailed
-from workflow.shell.output.dataset import Dataset, Datasets
+from workflow.layout.declared import Arrays
 from workflow.shell.terminal.reporter import FORECAST, Reporter
 
 # Times of a period from which amplitudes are taken. The true amplitude of harmonic 1 is at most
@@ -144,7 +144,7 @@ def response_under(
         steps,
     )
     curves = {**curves_of(case, model, branch), **stability.columns}
-    if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
+    if int(np.argmax(curves["amplitude"][:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{told}: no resonance, the largest motion is at an end of the curve")
     reporter.doing(f"{told}: resonance")
     peak = steps("resonance", lambda: _resonance(model, branch, curves))
@@ -211,17 +211,16 @@ def force_sweep(
     )
     curves = curves_of(case, model, branch)
     shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
-    along = f"{case.amount.description}, in the order of the curve"
-    datasets = {
-        case.amount.name: Dataset(branch.forces, case.amount.unit, along),
-        "amplitude": _of_the_last(curves["amplitude"]),
+    arrays = {
+        case.amount.name: branch.forces,
+        "amplitude": curves["amplitude"][:, -1],
         **{name: curves[name] for name in shared},
         **stability.columns,
     }
     folds = [float(branch.curve.parameters[place]) for place in branch.curve.folds]
     points = len(branch.solutions)
     numbers = {"frequency": frequency, "points": points, "folds": folds, "message": branch.message}
-    return Curves(datasets, numbers | stability.numbers, stability.bifurcations)
+    return Curves(arrays, numbers | stability.numbers, stability.bifurcations)
 
 
 def backbone_of(
@@ -252,23 +251,22 @@ def backbone_of(
         steps,
     )
     columns = motion_columns(model, backbone.problem, backbone.solutions)
-    resonance = "of phase resonance: what is driven lags the force by 90 degrees"
-    datasets = {
-        case.amount.name: Dataset(backbone.forces, case.amount.unit, case.amount.description),
-        "frequency": Dataset(backbone.frequencies, "Hz", resonance),
-        "amplitude": _of_the_last(columns["amplitude"]),
+    arrays = {
+        case.amount.name: backbone.forces,
+        "frequency": backbone.frequencies,
+        "amplitude": columns["amplitude"][:, -1],
         **{name: columns[name] for name in ("damping", "energy_per_cycle", "slip")},
         **stability.columns,
     }
     numbers = {"message": backbone.message, **stability.numbers}
-    return Curves(datasets, numbers, stability.bifurcations)
+    return Curves(arrays, numbers, stability.bifurcations)
 
 
 def _numbers(
     case: VibrationCase,
     model: VibrationModel,
     branch: ResponseBranch,
-    curves: Datasets,
+    curves: Arrays,
     problem: HarmonicBalance,
     resonance: HarmonicSolution,
 ) -> dict[str, Any]:
@@ -279,7 +277,7 @@ def _numbers(
         "resonance": resonance.frequency,
         "amplitude": float(amplitudes[-1]),
         "receptance": float(amplitudes[-1]) / resonance.force,
-        "first_amplitude": float(max(amplitudes[0], curves["amplitude"].values[:, 0].max())),
+        "first_amplitude": float(max(amplitudes[0], curves["amplitude"][:, 0].max())),
         "energy_per_cycle": float(resonance.cycle.dissipated.sum()),
         "damping": damping_ratio(problem, resonance),
         "slip": model.time_share(resonance, SLIP),
@@ -312,54 +310,36 @@ def _beside(
 
 def curves_of(
     case: VibrationCase, model: VibrationModel, branch: ResponseBranch | FurtherBranch
-) -> dict[str, Dataset]:
+) -> Arrays:
     """Return results of structure and joints along a branch, over the frequency."""
-    along = "frequency of the force, in the order of the curve"
-    frequencies = {"frequency": Dataset(branch.frequencies, "Hz", along)}
+    frequencies = {"frequency": branch.frequencies}
     if case.engine_order is not None:
-        speed = case.turning * branch.frequencies
-        frequencies["speed"] = Dataset(speed, "rad/s", "of the engine, by its order")
+        frequencies["speed"] = case.turning * branch.frequencies
     return {**frequencies, **motion_columns(model, branch.problem, branch.solutions)}
-
-
-def _of_the_last(amplitudes: Dataset) -> Dataset:
-    """Return the main observed amplitude ``(n,)`` of all observed ones ``(n, k)``."""
-    last = amplitudes.values[:, -1]
-    return Dataset(last, "mm", "half of the way to and fro of what is looked at")
 
 
 def motion_columns(
     model: VibrationModel, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
-) -> dict[str, Dataset]:
+) -> Arrays:
     """Return results of structure and joints along a curve ``(n,)``, amplitudes ``(n, k)``."""
 
-    def column(of: Callable[[HarmonicSolution], Array | float], unit: str, what: str) -> Dataset:
-        return Dataset(np.array([of(motion) for motion in motions]), unit, what)
+    def column(of: Callable[[HarmonicSolution], Array | float]) -> Array:
+        return np.array([of(motion) for motion in motions])
 
-    moving = bool(model.driving.ground)
-    seen = "half of the way to and fro of what is seen, the last looked at"
-    relative = f"{seen}, relative to the moving ground" if moving else seen
-    lag = "of harmonic 1 of what is looked at before the force, or before a sine at t = 0"
-    lost = "energy lost in a cycle over 4π times the largest kinetic energy"
-    slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
-    apart = "share of the cycle in which they are apart"
-    beyond = "estimated share of the joints' vibration in harmonics left out"
-    energy = "energy that the joints dissipate in a cycle"
     absolute = {}
-    if moving:
-        of_all = f"{seen}, that of the ground included"
+    if model.driving.ground:
         absolute["absolute_amplitude"] = column(
-            lambda motion: amplitudes_of(model, model.driving.absolute(motion)), "mm", of_all
+            lambda motion: amplitudes_of(model, model.driving.absolute(motion))
         )
     return {
-        "amplitude": column(lambda motion: amplitudes_of(model, motion), "mm", relative),
+        "amplitude": column(lambda motion: amplitudes_of(model, motion)),
         **absolute,
-        "phase": column(lambda motion: _phase(motion, model.rig.seen[-1]), "rad", lag),
-        "energy_per_cycle": column(lambda motion: motion.cycle.dissipated.sum(), "N mm", energy),
-        "damping": column(lambda motion: damping_ratio(problem, motion), "1", lost),
-        "slip": column(lambda motion: model.time_share(motion, SLIP), "1", slips),
-        "separated": column(lambda motion: model.time_share(motion, SEPARATED), "1", apart),
-        "left_out": column(lambda motion: motion.left_out, "1", beyond),
+        "phase": column(lambda motion: _phase(motion, model.rig.seen[-1])),
+        "energy_per_cycle": column(lambda motion: motion.cycle.dissipated.sum()),
+        "damping": column(lambda motion: damping_ratio(problem, motion)),
+        "slip": column(lambda motion: model.time_share(motion, SLIP)),
+        "separated": column(lambda motion: model.time_share(motion, SEPARATED)),
+        "left_out": column(lambda motion: motion.left_out),
     }
 
 
@@ -380,31 +360,20 @@ def amplitude_of(model: VibrationModel, solution: HarmonicSolution) -> float:
     return float(amplitudes_of(model, solution)[-1])
 
 
-def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
+def _nodes(branch: ResponseBranch) -> Arrays:
     """Return results of each joint along the curve."""
     cycles = [motion.cycle for motion in branch.solutions]
     slip = np.array([(cycle.states == SLIP).mean(axis=0) for cycle in cycles])
     separated = np.array([(cycle.states == SEPARATED).mean(axis=0) for cycle in cycles])
     energy = np.array([cycle.dissipated for cycle in cycles])
-    share = "share of the cycle in which each joint"
-    return {
-        "slip": Dataset(slip, "1", f"{share} slips, by point of the curve"),
-        "separated": Dataset(separated, "1", f"{share} is apart"),
-        "energy": Dataset(energy, "N mm", "energy that each joint dissipates in a cycle"),
-    }
+    return {"slip": slip, "separated": separated, "energy": energy}
 
 
-def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
+def _cycle(solution: HarmonicSolution) -> Arrays:
     """Return displacements, forces and states of all joints in a cycle."""
     displacement = (solution.resolution.basis @ solution.coefficients).transpose(1, 0, 2)
     states = solution.cycle.states.astype(np.int8)
-    moved = "of each joint along x, y and its closing, at times of a cycle"
-    pulled = "of each joint along x, y and its pressure"
-    return {
-        "displacement": Dataset(displacement, "mm", moved),
-        "force": Dataset(solution.cycle.samples, "N", pulled),
-        "state": Dataset(states, "1", "of each joint: 0 sticks, 1 slips, 2 is apart"),
-    }
+    return {"displacement": displacement, "force": solution.cycle.samples, "state": states}
 
 
 def warn_of_stroke(
@@ -428,12 +397,12 @@ def warn_of_stroke(
 # --- resonance ----------------------------------------------------------------------------------
 
 
-def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) -> HarmonicSolution:
+def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Arrays) -> HarmonicSolution:
     """Return the motion with the largest observed amplitude, searched around the largest point.
 
     Where the curve folds or ends there, this is the largest point itself.
     """
-    sizes = curves["amplitude"].values[:, -1]
+    sizes = curves["amplitude"][:, -1]
     place = int(np.argmax(sizes))
     best = branch.solutions[place]
     if place in (0, len(sizes) - 1):

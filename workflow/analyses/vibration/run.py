@@ -17,8 +17,14 @@ from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.further import further_from
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.modes import mode_of, refuse_missing_modes
-from workflow.analyses.vibration.output.harmonics import CURVE, harmonics_along, names_of
-from workflow.analyses.vibration.output.outcome import Curves, Response, VibrationOutcome, trend
+from workflow.analyses.vibration.output.harmonics import harmonics_along, names_of
+from workflow.analyses.vibration.output.outcome import (
+    CURVE,
+    Curves,
+    Response,
+    VibrationOutcome,
+    trend,
+)
 from workflow.analyses.vibration.output.results import write_vibration_output
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.stability import looked_for

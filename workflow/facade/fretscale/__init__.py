@@ -23,7 +23,6 @@ Results
     - ``Results``: the summary, warnings and case of a run, and everything that it computed.
     - ``MainResult``: a main result of a run, with unit and estimated error.
     - ``Group``: datasets and groups of ``results.h5`` under one name.
-    - ``Values``: a dataset, read on demand, with its unit and description.
 
 Comparison of runs
     - ``compare``: compare finished runs.
@@ -115,7 +114,7 @@ if TYPE_CHECKING:
     from workflow.errors import CaseError, MethodFailed, NotWritten, OutOfMemory, UserError
     from workflow.interface.cases import Check, check, load_case
     from workflow.interface.comparing import ComparedResult, Comparison, compare
-    from workflow.interface.datasets import Group, Values
+    from workflow.interface.datasets import Group
     from workflow.interface.fitting import FitResult, FittedParameter, fit
     from workflow.interface.modelling import wear_model
     from workflow.interface.observers import Checkpoint, Progress
@@ -161,7 +160,6 @@ __all__ = [
     "TightenedBolt",
     "UncoupledSource",
     "UserError",
-    "Values",
     "Wear",
     "WearModel",
     "check",
@@ -195,7 +193,7 @@ __getattr__, __dir__ = lazy_names(
         ),
         "workflow.interface.cases": ("Check", "check", "load_case"),
         "workflow.interface.comparing": ("ComparedResult", "Comparison", "compare"),
-        "workflow.interface.datasets": ("Group", "Values"),
+        "workflow.interface.datasets": ("Group",),
         "workflow.interface.fitting": ("FitResult", "FittedParameter", "fit"),
         "workflow.interface.results": ("MainResult", "Results", "open"),
         "workflow.interface.running": ("run",),

@@ -15,6 +15,7 @@ from sa_solver.types import Array, Indices
 from workflow.analyses.vibration.case.excitation import FORCE, LEVEL, ExcitationSize
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.figures.stability import draw_motions, explain_stability
+from workflow.analyses.vibration.output.outcome import RESPONSES
 from workflow.analyses.vibration_wear.output.outcome import (
     CONTACT,
     EVOLUTION,
@@ -22,7 +23,6 @@ from workflow.analyses.vibration_wear.output.outcome import (
     LOOP,
     NODES,
     PLACES,
-    RESPONSES,
     WORN,
     VibrationWearContents,
 )
