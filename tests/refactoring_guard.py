@@ -60,8 +60,10 @@ ADDED = re.compile(r"manifest\.json|results\.h5 > @kind")
 # Relative to the largest value of a field: sums in another order differ by some 1e-12.
 ROUNDING = 1e-9
 # Fields that differ from run to run, or with what the cache already holds; a chart chooses by time.
+# Labels of axes come on top.
 UNCOMPARED = re.compile(
     r"seconds|versions|from_cache|> case@|chart/summary.json > .*(chosen|together|sentences)"
+    r"|@(coordinates|CLASS|NAME|DIMENSION_\w+|units|long_name)$|h5 > dimensions"
 )
 # How well an equation holds, a share: compared with 1, not with its own noise.
 RESIDUALS = re.compile(r"residual|closure|equilibrium_error")

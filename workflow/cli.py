@@ -269,7 +269,7 @@ def check(case: str, overrides: tuple[str, ...], out: Path | None, force: bool) 
 
     loaded = load_case(case, overrides)
     analysis = analysis_of(loaded)
-    check_measured(loaded, analysis.curves)
+    check_measured(loaded, analysis.curves, analysis.layout(loaded))
     memory, run_time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
     click.echo(f"OK {case}: {loaded.title}")

@@ -109,7 +109,7 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
     """
     loaded = load_case(case, **overrides)
     analysis = kinds.analysis_of(loaded)
-    check_measured(loaded, analysis.curves)
+    check_measured(loaded, analysis.curves, analysis.layout(loaded))
     memory, time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
     outline, doubts = (*loaded.outline(), *taken(loaded)), tuple(doubts_of(loaded))

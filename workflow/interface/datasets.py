@@ -1,22 +1,19 @@
-"""Contents of ``results.h5``, read on demand, as numpy, xarray and pandas objects."""
+"""Contents of ``results.h5``, read on demand, as xarray and pandas objects."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
-from numpy.lib.mixins import NDArrayOperatorsMixin
-from numpy.typing import NDArray
 
 from workflow.errors import UserError
-from workflow.shell.output.results import COORDINATES
+from workflow.shell.output.results import DIMENSIONS, NO_COORDINATE, own
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,12 +49,12 @@ def _written(path: Path) -> tuple[int, ...]:
     return status.st_ino, status.st_size, status.st_mtime_ns
 
 
-class Values(NDArrayOperatorsMixin):
-    """Dataset whose ``values`` are read on demand; the rest is known at once.
+class Group(Mapping[str, "Group | xr.DataArray"]):
+    """Groups and datasets under one name in ``results.h5``, accessed by name or path.
 
-    Numpy treats it as an array; ``[...]`` reads a part of it. ``unit`` is "1" for none. ``dims``
-    are the names of its axes, "" for an unnamed one; ``coordinates`` are the values along the axes,
-    by name.
+    A dataset is an ``xarray.DataArray`` with its coordinates, and with its unit and description as
+    ``attrs["units"]`` and ``attrs["long_name"]``. ``attributes`` are the numbers and texts that
+    belong to the group.
 
     Examples
     --------
@@ -71,100 +68,12 @@ class Values(NDArrayOperatorsMixin):
     ...     output__figures=False,
     ... )
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     pressure = fretscale.run(coarse, folder, quiet=True)["contact/bodies/00001/pressure"]
-    ...     print(pressure.dims, pressure.unit, f"{pressure.values.sum() / 16.0**2:.3f} N")
-    ('x', 'y') MPa 400.000 N
-    """
-
-    def __init__(self, file: ResultsFile, dataset: h5py.Dataset) -> None:
-        self._file = file
-        self.name: str = dataset.name.strip("/")
-        self.unit = str(dataset.attrs.get("unit", "1"))
-        self.description = str(dataset.attrs.get("description", ""))
-        self.shape: tuple[int, ...] = dataset.shape
-        self.dtype = dataset.dtype
-        self.dims = tuple(str(axis.label) for axis in dataset.dims)
-        above = self.name.rpartition("/")[0]
-        self._homes = (above, str(dataset.attrs.get(COORDINATES, above)))
-
-    def __getitem__(self, part: Any) -> Any:
-        with self._file.reading() as file:
-            return file[self.name][part]
-
-    @cached_property
-    def values(self) -> NDArray[Any]:
-        """All values of the dataset."""
-        return np.asarray(self[()])
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        return np.array(self.values, dtype=dtype, copy=copy)
-
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **settings: Any) -> Any:
-        plain = [item.values if isinstance(item, Values) else item for item in inputs]
-        return getattr(ufunc, method)(*plain, **settings)
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter(self.values)
-
-    def __float__(self) -> float:
-        return float(self.values)
-
-    @property
-    def ndim(self) -> int:
-        """Number of axes."""
-        return len(self.shape)
-
-    @property
-    def coordinates(self) -> dict[str, Values]:
-        """Datasets along the axes, by the names of the axes."""
-        found = {}
-        with self._file.reading() as file:
-            for dim in filter(None, self.dims):
-                paths = (f"{home}/{dim}" for home in self._homes)
-                there = [file[path] for path in paths if path in file]
-                if there:
-                    found[dim] = Values(self._file, there[0])
-        return found
-
-    def xarray(self) -> xr.DataArray:
-        """Return the dataset as an ``xarray.DataArray``."""
-        return _data_array(self)
-
-    def pandas(self) -> pd.Series:
-        """Return a curve as a ``pandas.Series``; raise :class:`UserError` for other datasets."""
-        return _series(self)
-
-    def __repr__(self) -> str:
-        shape = ", ".join(
-            f"{dim} {n}" if dim else str(n) for dim, n in zip(self.dims, self.shape, strict=True)
-        )
-        unit = "" if self.unit == "1" else f" [{self.unit}]"
-        return f"{self.name} ({shape}){unit}: {self.description}"
-
-
-class Group(Mapping[str, "Group | Values"]):
-    """Groups and datasets under one name in ``results.h5``, accessed by name or path.
-
-    ``attributes`` are the numbers and texts that belong to the group.
-
-    Examples
-    --------
-    Access by names and by paths:
-
-    >>> import fretscale, tempfile
-    >>> coarse = fretscale.load_case(
-    ...     "cases/sphere_normal.yaml",
-    ...     contact__grid=[16, 16],
-    ...     output__paraview=False,
-    ...     output__figures=False,
-    ... )
-    >>> with tempfile.TemporaryDirectory() as folder:
     ...     results = fretscale.run(coarse, folder, quiet=True)
     ...     print(list(results["grid/bodies"]), results["grid"]["bodies/x"].shape)
+    ...     pressure = results["contact/bodies/00001/pressure"]
     ['x', 'y'] (16,)
+    >>> print(pressure.dims, pressure.units, f"{float(pressure.sum()) / 16.0**2:.3f} N")
+    ('x', 'y') MPa 400.000 N
     """
 
     def __init__(self, file: ResultsFile, name: str = "") -> None:
@@ -179,26 +88,25 @@ class Group(Mapping[str, "Group | Values"]):
         path = f"{self.name}/{name}".strip("/")
         with self._file.reading() as file:
             if path not in file:
-                with self._reading() as group:
-                    known = ", ".join(group)
+                known = ", ".join(self)
                 raise KeyError(f"{name}: not there; {self.name or 'the results'}: {known}")
-            item = file[path]
-            dataset = isinstance(item, h5py.Dataset)
-            return Values(self._file, item) if dataset else Group(self._file, path)
+            if isinstance(file[path], h5py.Group):
+                return Group(self._file, path)
+            above, _, last = path.rpartition("/")
+            return _data_set(file[above or "/"], last)[last]
 
     def __iter__(self) -> Iterator[str]:
         with self._reading() as group:
-            return iter(list(group))
+            return iter([name for name in own(group) if name != DIMENSIONS])
 
     def __len__(self) -> int:
-        with self._reading() as group:
-            return len(group)
+        return len(list(iter(self)))
 
     @property
     def attributes(self) -> dict[str, Any]:
         """Numbers and texts that belong to the group, by name."""
         with self._reading() as group:
-            return {name: _plain(value) for name, value in group.attrs.items()}
+            return _attributes(group)
 
     def tree(self, depth: int = 20) -> str:
         """Return the contents as lines with shapes and units, down to ``depth`` levels."""
@@ -207,31 +115,82 @@ class Group(Mapping[str, "Group | Values"]):
     def _lines(self, depth: int, indent: str = "") -> Iterator[str]:
         """Yield the lines of the tree, with only the first of numbered groups."""
         numbered = [name for name in self if name.isdecimal()]
-        for name in self:
-            if name in numbered[1:]:
-                continue
-            more = f" to {numbered[-1]}" if name in numbered[:1] and len(numbered) > 1 else ""
-            item = self[name]
-            if isinstance(item, Values):
-                yield indent + repr(item).removeprefix(f"{self.name}/")
-            else:
+        with self._reading() as group:
+            for name in self:
+                if name in numbered[1:]:
+                    continue
+                more = f" to {numbered[-1]}" if name in numbered[:1] and len(numbered) > 1 else ""
+                if isinstance(group[name], h5py.Dataset):
+                    yield indent + _line(group[name])
+                    continue
                 yield f"{indent}{name}{more}/"
                 if depth > 1:
-                    yield from item._lines(depth - 1, indent + "  ")
+                    below = Group(self._file, f"{self.name}/{name}".strip("/"))
+                    yield from below._lines(depth - 1, indent + "  ")
 
     def xarray(self) -> xr.Dataset:
         """Return the datasets as an ``xarray.Dataset``; those of numbered groups are concatenated.
 
         The new axis has the cycles, increments or forces that distinguish the groups.
         """
-        return _data_set(self)
+        import xarray
+
+        with self._reading() as group:
+            found = _data_set(group)
+            numbered = _numbered(group)
+            if not numbered:
+                return found
+            parts = [_data_set(part) for part in numbered.values()]
+            along = xarray.Variable(*_told_apart(numbered))
+        first = parts[0]
+        alike = [
+            name
+            for name, array in first.data_vars.items()
+            if all(name in part and part[name].sizes == array.sizes for part in parts)
+        ]
+        stacked = xarray.concat(
+            [part[alike] for part in parts],
+            along,
+            data_vars="all",
+            coords="minimal",
+            compat="override",
+            join="outer",
+            combine_attrs="drop",
+        )
+        for name in alike:
+            stacked[name].attrs = first[name].attrs
+        return stacked.assign(found.data_vars).assign_attrs(found.attrs)
 
     def pandas(self) -> pd.DataFrame:
         """Return the curves as a ``pandas.DataFrame``, or the numbers of numbered groups.
 
         Numbered groups have a row each. Raises :class:`UserError` where there is neither.
         """
-        return _data_frame(self)
+        import pandas
+
+        with self._reading() as group:
+            numbered, found = _numbered(group), _data_set(group)
+            rows = [
+                {k: v for k, v in _attributes(part).items() if np.ndim(v) == 0}
+                for part in numbered.values()
+            ]
+            axis, places = _told_apart(numbered) if numbered else ("", [])
+        curves = [name for name, array in found.data_vars.items() if array.ndim == 1]
+        dims = {found[name].dims for name in curves}
+        if len(dims) == 1:
+            headings = {name: _heading(str(name), found[name]) for name in curves}
+            table = found[curves].to_dataframe().rename(columns=headings)
+            dim = str(table.index.name)
+            # Increments without a coordinate have no numbers.
+            table.index.name = _heading(dim, found[dim]) if dim in found.coords else None
+            return table
+        if curves or not numbered:
+            raise UserError(
+                f"{self.name or 'the results'}: no table; allowed: groups of curves that are "
+                "equally long, or of numbered groups"
+            )
+        table = pandas.DataFrame(rows, pandas.Index(places, name=axis))
+        return table.drop(columns=axis, errors="ignore")
 
     def __repr__(self) -> str:
         return f"{self.name}/\n" + "\n".join(self._lines(2, "  "))
@@ -240,131 +199,72 @@ class Group(Mapping[str, "Group | Values"]):
         return f"<pre>{escape(repr(self))}</pre>"
 
 
-def _plain(value: Any) -> Any:
-    """Return an attribute as a Python object."""
-    return value.item() if isinstance(value, np.generic) else value
+# --- reading -------------------------------------------------------------------------------------
 
 
-# --- xarray and pandas ---------------------------------------------------------------------------
-
-
-def _data_array(values: Values) -> xr.DataArray:
-    """Return a dataset with its coordinates."""
+def _data_set(group: h5py.Group, only: str | None = None) -> xr.Dataset:
+    """Return the datasets of a group, or one ``only``, with their coordinates."""
     import xarray
 
-    dims = _dims(values)
-    coordinates = {
-        dim: xarray.Variable((dim,), along.values, _attributes(along))
-        for dim, along in values.coordinates.items()
-        if along.shape == (values.shape[dims.index(dim)],)
+    chosen = group.keys() if only is None else [only, *_dims(only, group[only])]
+    variables = {
+        name: xarray.Variable(_dims(name, item), item[()], _described(item))
+        for name, item in ((name, group[name]) for name in chosen if name in group)
+        if isinstance(item, h5py.Dataset)
+        and not (item.is_scale and NO_COORDINATE in str(item.attrs["NAME"]))
     }
-    return xarray.DataArray(
-        values.values, coordinates, dims, values.name.rpartition("/")[2], _attributes(values)
-    )
+    return xarray.Dataset(variables, attrs=_attributes(group))
 
 
-def _data_set(group: Group) -> xr.Dataset:
-    """Return the datasets of a group, with those of its numbered groups concatenated."""
-    import xarray
-
-    arrays = {name: _data_array(item) for name, item in _datasets(group).items()}
-    curves = {name: array for name, array in arrays.items() if name not in array.coords}
-    numbered = _numbered(group)
-    if numbered:
-        axis, places = _told_apart(numbered)
-        along = xarray.Variable((axis,), places)
-        for name, parts in _alike(numbered).items():
-            stacked = [_data_array(part) for part in parts]
-            curves[name] = xarray.concat(stacked, along, combine_attrs="override")
-    return xarray.Dataset(curves, attrs=group.attributes)
-
-
-def _series(values: Values) -> pd.Series:
-    """Return a curve over its coordinate."""
-    import pandas
-
-    if values.ndim != 1:
-        raise UserError(f"{values.name}: of {values.ndim} axes; allowed: curves, of one")
-    return pandas.Series(values.values, _index(values), name=_heading(values))
-
-
-def _data_frame(group: Group) -> pd.DataFrame:
-    """Return the curves of a group as columns, or the numbers of its numbered groups."""
-    import pandas
-
-    datasets = {name: item for name, item in _datasets(group).items() if item.ndim == 1}
-    if datasets and len({item.shape for item in datasets.values()}) == 1:
-        index = _index(next(iter(datasets.values())))
-        over = None if index is None else index.name
-        columns = {_heading(item): item.values for item in datasets.values()}
-        return pandas.DataFrame({k: v for k, v in columns.items() if k != over}, index)
-    numbered = _numbered(group)
-    if datasets or not numbered:
-        raise UserError(
-            f"{group.name or 'the results'}: no table; allowed: groups of curves that are equally "
-            "long, or of numbered groups"
-        )
-    axis, places = _told_apart(numbered)
-    rows = [
-        {name: value for name, value in part.attributes.items() if np.ndim(value) == 0}
-        for part in numbered.values()
-    ]
-    return pandas.DataFrame(rows, pandas.Index(places, name=axis)).drop(
-        columns=axis, errors="ignore"
-    )
-
-
-def _attributes(values: Values) -> dict[str, str]:
-    """Return the attributes under their names in the CF conventions."""
-    return {"units": values.unit, "long_name": values.description}
-
-
-def _heading(values: Values) -> str:
-    name = values.name.rpartition("/")[2]
-    return name if values.unit == "1" else f"{name} [{values.unit}]"
-
-
-def _dims(values: Values) -> list[str]:
+def _dims(name: str, dataset: h5py.Dataset) -> list[str]:
     """Return the names of all axes; an unnamed axis gets a name from its dataset."""
-    name = values.name.rpartition("/")[2]
-    return [dim or f"{name}_{axis}" for axis, dim in enumerate(values.dims)]
+    if dataset.is_scale:
+        return [name]
+    return [
+        axis[0].name.rpartition("/")[2] if len(axis) else f"{name}_{number}"
+        for number, axis in enumerate(dataset.dims)
+    ]
 
 
-def _index(values: Values) -> Any:
-    """Return the coordinate of curves as an index; None if they have none."""
-    along = values.coordinates.get(values.dims[0])
-    if along is None:
-        return None
-    import pandas
-
-    return pandas.Index(along.values, name=_heading(along))
+def _described(dataset: h5py.Dataset) -> dict[str, str]:
+    """Return unit and description under their names in the CF conventions."""
+    return {
+        "units": str(dataset.attrs.get("unit", "1")),
+        "long_name": str(dataset.attrs.get("description", "")),
+    }
 
 
-def _datasets(group: Group) -> dict[str, Values]:
-    return {name: item for name, item in group.items() if isinstance(item, Values)}
+def _attributes(group: h5py.Group) -> dict[str, Any]:
+    """Return the attributes of a group as Python objects."""
+    return {
+        name: value.item() if isinstance(value, np.generic) else value
+        for name, value in group.attrs.items()
+    }
 
 
-def _numbered(group: Group) -> dict[str, Group]:
+def _line(dataset: h5py.Dataset) -> str:
+    """Return the line of a dataset in a tree."""
+    name, described = dataset.name.rpartition("/")[2], _described(dataset)
+    sizes = zip(_dims(name, dataset), dataset.shape, strict=True)
+    shape = ", ".join(f"{dim} {length}" for dim, length in sizes)
+    unit = "" if described["units"] == "1" else f" [{described['units']}]"
+    return f"{name} ({shape}){unit}: {described['long_name']}"
+
+
+def _heading(name: str, array: xr.DataArray) -> str:
+    return name if array.attrs["units"] == "1" else f"{name} [{array.attrs['units']}]"
+
+
+def _numbered(group: h5py.Group) -> dict[str, h5py.Group]:
     """Return the groups in a group whose names are numbers."""
-    groups = {name: item for name, item in group.items() if isinstance(item, Group)}
-    return {name: item for name, item in groups.items() if name.isdecimal()}
+    return {name: group[name] for name in group if name.isdecimal()}
 
 
-def _told_apart(numbered: dict[str, Group]) -> tuple[str, list[Any]]:
+def _told_apart(numbered: Mapping[str, h5py.Group]) -> tuple[str, list[Any]]:
     """Return the attribute that distinguishes the groups, and its value for each."""
-    attributes = [part.attributes for part in numbered.values()]
+    attributes = [_attributes(part) for part in numbered.values()]
     for name in TOLD_APART_BY:
         places = [found.get(name) for found in attributes]
         if None not in places and len(set(places)) == len(places):
             return name, places
     return NUMBER, [int(name) for name in numbered]
-
-
-def _alike(numbered: dict[str, Group]) -> dict[str, list[Values]]:
-    """Return the datasets that all groups have in the same shape."""
-    parts = [_datasets(part) for part in numbered.values()]
-    return {
-        name: [part[name] for part in parts]
-        for name, first in parts[0].items()
-        if all(name in part and part[name].shape == first.shape for part in parts)
-    }

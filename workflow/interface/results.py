@@ -99,7 +99,7 @@ class Results(Group):
 
     ``folder`` is the folder of the run, ``warnings`` are its warnings, and ``main`` are its main
     results with units and estimated errors. ``results["contact"]`` is a :class:`Group`,
-    ``results["kinetics/cycles"]`` a :class:`Values`; ``tree()`` lists the contents.
+    ``results["kinetics/cycles"]`` an ``xarray.DataArray``; ``tree()`` lists the contents.
 
     Examples
     --------

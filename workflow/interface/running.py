@@ -57,10 +57,9 @@ def run(
     ... )
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     ball = fretscale.run(coarse, folder, quiet=True)
-    ...     print(ball["history/P"])
-    ...     print(f"{ball['history/P'][-1]:.1f}")
-    history/P (increment 1) [N]: normal force on body 2
-    400.0
+    ...     force = ball["history/P"]
+    >>> print(f"{force.long_name}: {float(force[-1]):.1f} {force.units}")
+    normal force on body 2: 400.0 N
     """
     hold_standard_streams()
     loaded = load_case(case, **overrides)

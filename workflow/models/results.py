@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,63 +15,46 @@ from wear.contact.tractions import ContactFields
 from wear.coupled import CoupledState, Observer
 from wear.steps.step_errors import step_errors
 from wear.surfaces import Surfaces
+from workflow.layout.declared import CELLS, GRID, Declared, over
 from workflow.models.contacts import FaceContacts
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-class Declared(NamedTuple):
-    """Unit, description and dimensions of a variable of the results."""
-
-    unit: str
-    description: str
-    dims: tuple[str, ...]
-
-    def variable(self, values: Array, per_length: bool = False) -> xr.Variable:
-        """Return values as a variable; extensive quantities may be ``per_length`` [1/mm]."""
-        import xarray as xr
-
-        unit = f"{self.unit}/mm" if per_length and self.unit in FORCES else self.unit
-        return xr.Variable(self.dims, values, {"units": unit, "long_name": self.description})
-
-
-CELLS = ("x", "y")
-PLANE = ("component", *CELLS)
-LOADS = ("state", "increment")
-COORDINATES = {
-    "cycles": Declared("1", "load cycles so far", ("cycles",)),
-    "x": Declared("mm", "centres of cells along x of the face", ("x",)),
-    "y": Declared("mm", "centres of cells along y of the face", ("y",)),
-}
+COORDINATES = {**over("cycles", cycles=("1", "load cycles so far")), **GRID}
 FIELDS = {
-    "gap": Declared("mm", "between the unloaded, unworn bodies", CELLS),
-    "depth_1": Declared("mm", "worn off body 1", ("cycles", *CELLS)),
-    "depth_2": Declared("mm", "worn off body 2", ("cycles", *CELLS)),
-    "pressure": Declared("MPa", "at peak load", ("cycles", *CELLS)),
-    "shear": Declared("MPa", "on body 2 at peak load", ("cycles", *PLANE)),
-    "slip": Declared("mm", "of body 2 in the increment of peak load", ("cycles", *PLANE)),
+    **over(CELLS, gap=("mm", "between the unloaded, unworn bodies")),
+    **over(
+        f"cycles {CELLS}",
+        depth_1=("mm", "worn off body 1"),
+        depth_2=("mm", "worn off body 2"),
+        pressure=("MPa", "at peak load"),
+    ),
+    **over(
+        f"cycles component {CELLS}",
+        shear=("MPa", "on body 2 at peak load"),
+        slip=("mm", "of body 2 in the increment of peak load"),
+    ),
 }
-SCALARS = {
-    "largest_depth_1": Declared("mm", "largest depth worn off body 1", ("cycles",)),
-    "largest_depth_2": Declared("mm", "largest depth worn off body 2", ("cycles",)),
-    "volume_1": Declared("mm^3", "worn off body 1", ("cycles",)),
-    "volume_2": Declared("mm^3", "worn off body 2", ("cycles",)),
-    "energy": Declared("N mm", "dissipated so far", ("cycles",)),
-}
-RESULTANTS = {
-    "P": Declared("N", "normal force, positive where the bodies are pressed together", LOADS),
-    "Qx": Declared("N", "force on body 2 along x", LOADS),
-    "Qy": Declared("N", "force on body 2 along y", LOADS),
-    "Mx": Declared("N mm", "moment on body 2 about x", LOADS),
-    "My": Declared("N mm", "moment on body 2 about y", LOADS),
-    "Mz": Declared("N mm", "moment on body 2 about z", LOADS),
-}
-RUN = {
-    "drift": Declared("1", "change of the resultants after each jump, relative", ("cycles",)),
-}
-FORCES = {"N", "N mm", "mm^3"}
-"""Units of quantities that are per length [1/mm] in a line contact."""
+SCALARS = over(
+    "cycles",
+    largest_depth_1=("mm", "largest depth worn off body 1"),
+    largest_depth_2=("mm", "largest depth worn off body 2"),
+    volume_1=("mm^3", "worn off body 1"),
+    volume_2=("mm^3", "worn off body 2"),
+    energy=("N mm", "dissipated so far"),
+)
+RESULTANTS = over(
+    "state increment",
+    P=("N", "normal force, positive where the bodies are pressed together"),
+    Qx=("N", "force on body 2 along x"),
+    Qy=("N", "force on body 2 along y"),
+    Mx=("N mm", "moment on body 2 about x"),
+    My=("N mm", "moment on body 2 about y"),
+    Mz=("N mm", "moment on body 2 about z"),
+)
+RUN = over("cycles", drift=("1", "change of the resultants after each jump, relative"))
 
 
 @dataclass

@@ -167,7 +167,7 @@ def _start(
     cannot be used.
     """
     analysis = analysis_of(case)
-    check_measured(case, analysis.curves)
+    check_measured(case, analysis.curves, analysis.layout(case))
     with closing(Screen(loudness > Loudness.QUIET)) as screen, screen.row("choice of settings"):
         case, choice = analysis.choose(case)
     analysis.memory(case).check()

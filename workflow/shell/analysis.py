@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from workflow.case.sections import Case
+from workflow.layout.declared import Layout
 from workflow.shell.memory import Memory
 from workflow.shell.processes import WorkerProcess
 from workflow.shell.run_time import RunTime
@@ -158,6 +159,8 @@ class Analysis(Generic[AnyCase]):
         Estimates how long a run takes.
     quantities
         Returns the main results, for everything that shows or compares runs.
+    layout
+        Returns the layout of ``results.h5`` of a case.
     curves
         Curves that are drawn over each other where runs are compared.
     pictures
@@ -184,6 +187,7 @@ class Analysis(Generic[AnyCase]):
     memory: Callable[[AnyCase], Memory]
     run_time: Callable[[AnyCase], RunTime]
     quantities: Callable[[AnyCase, Summary], Sequence[SummaryQuantity]] = no_quantities
+    layout: Callable[[AnyCase], Layout] = lambda case: Layout({})
     curves: Sequence[CurvesOf] = ()
     pictures: Callable[[], Pictures] | None = None
     beside: Share = "nothing"

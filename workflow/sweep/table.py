@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
+from workflow.layout.declared import unit_in
 from workflow.runs.job import Finished
-from workflow.shell.output.dataset import unit_in
 from workflow.shell.output.tables import heading, write_table
 from workflow.sweep.design import SweepRun
 from workflow.sweep.schema import WrittenNumber, amount_of

@@ -172,13 +172,11 @@ def test_curves_are_found_by_patterns(tmp_path):
         field = file.create_dataset("contact/face/00007/pressure", data=np.arange(12).reshape(4, 3))
         field.attrs["unit"] = "MPa"
         at = "responses/*/loops/-1"
-        loops = CurvesOf("loop", f"{at}/force", f"{at}/displacement", ("N", "mm"))
+        loops = CurvesOf("loop", f"{at}/force", f"{at}/displacement")
         found = list(curves_in(file, loops))
         assert [curve.title for curve in found] == ["loop, under 10 N", "loop, under 30 N"]
         assert found[0].y.tolist() == [10.0, 10.0, 10.0]
-        (profile,) = curves_in(
-            file, CurvesOf("p", "grid/*", "contact/*/-1/pressure", ("mm", "MPa"))
-        )
+        (profile,) = curves_in(file, CurvesOf("p", "grid/*", "contact/*/-1/pressure"))
         assert (profile.title, profile.y.tolist()) == ("p, face", [1, 4, 7, 10])
         assert profile.x.tolist() == [-1.5, -0.5, 0.5, 1.5]
-        assert list(curves_in(file, CurvesOf("none", "grid/*", "loops/*/-1/force", ("", "")))) == []
+        assert list(curves_in(file, CurvesOf("none", "grid/*", "loops/*/-1/force"))) == []

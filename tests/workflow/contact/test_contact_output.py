@@ -18,7 +18,7 @@ from tests.workflow.output.shown_files import check_arrays, check_scene, total
 from workflow.analyses.contact import ANALYSIS
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.output import figures
-from workflow.analyses.contact.output.datasets import ContactContents
+from workflow.analyses.contact.output.layout import ContactContents
 from workflow.analyses.contact.output.results import ContactOutcome, write_contact_results
 from workflow.analyses.contact.output.summary import loop_summary, state_summaries
 from workflow.case.text.writing import dump_case

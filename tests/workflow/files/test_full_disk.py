@@ -15,6 +15,7 @@ from tests.workflow.command_line import runs_here
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow.errors import MethodFailed, NotWritten
 from workflow.kinds import load_case
+from workflow.layout.declared import Layout
 from workflow.runs.run import resume_run, run_case
 from workflow.shell.folders import store
 from workflow.shell.folders.store import read_arrays, replacing, write_arrays, write_text
@@ -119,7 +120,7 @@ def test_hdf5_through_the_outlet_is_read_back(tmp_path):
 
 
 def test_an_error_of_whoever_writes_is_told_as_it_is(tmp_path):
-    with pytest.raises(MethodFailed, match="mine"), writing(tmp_path / "a.h5"):
+    with pytest.raises(MethodFailed, match="mine"), writing(tmp_path / "a.h5", Layout({})):
         raise MethodFailed("mine")
     with pytest.raises(FileNotFoundError) as raised, replacing(tmp_path / "a.txt"):
         (tmp_path / "other.txt").read_text()

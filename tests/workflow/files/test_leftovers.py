@@ -4,11 +4,13 @@ import json
 import os
 import shutil
 import socket
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
 import pytest
+import xarray
 
 from tests.marks import slow
 from tests.workflow.command_line import invoke, jobs_here
@@ -21,7 +23,6 @@ from workflow.shell.folders import steps
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.lock import LOCK
 from workflow.shell.output.curves import curves_in
-from workflow.shell.output.dataset import unit_in
 
 PARTIAL = ".results.h5.123.part.h5"
 
@@ -105,11 +106,27 @@ def test_whoever_takes_up_a_finished_run_clears_it(joint, take_up, tmp_path):
 def check_units_of_curves(run):
     """Assert that the units against which measured points are checked are those of the results."""
     folder = OutputFolder(run)
+    case = load_case(folder.case)
+    analysis = analysis_of(case)
+    layout = analysis.layout(case)
     with h5py.File(folder.results) as file:
-        for wanted in analysis_of(load_case(folder.case)).curves:
+        for wanted in analysis.curves:
             for curve in curves_in(file, wanted):
-                for unit, declared in zip((curve.x_unit, curve.y_unit), wanted.units, strict=True):
-                    assert not declared or unit in (declared, unit_in(True, declared)), curve.title
+                units = [
+                    (layout.unit(wanted.x, line), layout.unit(wanted.y, line))
+                    for line in (False, True)
+                ]
+                assert (curve.x_unit, curve.y_unit) in units, curve.title
+
+
+def check_opens_in_xarray(run):
+    """Assert that xarray reads the results by itself, without a warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with xarray.open_datatree(OutputFolder(run).results, engine="h5netcdf") as tree:
+            for node in tree.subtree:
+                assert all(array.units for array in node.to_dataset(inherit=False).values())
+            tree.load()
 
 
 EVERY_KIND = [slow(kind) for kind in RUNS if kind != "joint"]
@@ -122,6 +139,7 @@ def test_runs_of_every_kind_are_cleared(kind, tmp_path):
         resumed(run.cut)
         check_clean(run, run.cut)
     check_units_of_curves(runs[0].whole)
+    check_opens_in_xarray(runs[0].whole)
 
 
 def test_what_somebody_put_there_stays(joint, tmp_path):

@@ -24,6 +24,7 @@ from tests.workflow.contact_loads import (
     write,
 )
 from workflow.analyses.wear.output.datasets import put_face
+from workflow.analyses.wear.output.layout import LAYOUT
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
 from workflow.analyses.wear.structures.resultants.writing import (
     write_resultants_csv,
@@ -153,7 +154,7 @@ def test_slip_on_the_grid_is_the_same_bit_for_bit(tmp_path):
 def test_results_of_a_run_are_read_from_their_group(tmp_path):
     """``results.h5:structure`` holds the structure's results of a run."""
     history, path = face_history(), tmp_path / "results.h5"
-    with writing(path) as writer:
+    with writing(path, LAYOUT) as writer:
         put_face(writer, "structure/intrados", history.interface, history)
     imported = read_resultants(f"{path}:structure")["intrados"]
     assert_same(imported.loads, history.loads)

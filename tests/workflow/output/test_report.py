@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.scenes import BALL
 from workflow.analyses import contact, time, vibration, vibration_wear, wear
-from workflow.analyses.contact.output.datasets import ContactContents as ContactContents
+from workflow.analyses.contact.output.layout import ContactContents as ContactContents
 from workflow.analyses.time.outcome import MotionContents as TimeContents
 from workflow.analyses.vibration.output.outcome import VibrationContents as VibrationContents
 from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents as WornContents
@@ -22,6 +22,7 @@ from workflow.analyses.wear.output.layout import WearContents as WearContents
 from workflow.case.text.readable import readable
 from workflow.case.text.typeset import exact_percent, given, number, typeset
 from workflow.errors import UserError
+from workflow.layout.declared import Layout
 from workflow.pictures.drawing import write_figures
 from workflow.pictures.panels import widen
 from workflow.report.run_page import AT_ONCE, _warnings
@@ -197,12 +198,12 @@ CONTENTS = {
 def test_results_say_what_they_hold(analysis, tmp_path):
     path, contents = tmp_path / "results.h5", CONTENTS[analysis]
     with h5py.File(path, "w") as file:
-        ResultsWriter(file).put_contents(contents)
+        ResultsWriter(file, Layout({})).put_contents(contents)
     kind = analysis.ANALYSIS.pictures().contents
     assert read_contents(path, kind) == contents
     other = next(c for c in CONTENTS.values() if type(c) is not kind)
     with h5py.File(path, "w") as file:
-        ResultsWriter(file).put_contents(other)
+        ResultsWriter(file, Layout({})).put_contents(other)
     with pytest.raises(UserError, match="of another version; run the case again"):
         read_contents(path, kind)
     with h5py.File(path, "w"):

@@ -14,6 +14,7 @@ from tests.conftest import CASES
 from workflow.case.sections import Case, Measured
 from workflow.errors import UserError
 from workflow.kinds import load_case
+from workflow.layout.declared import Declared, Layout
 from workflow.pictures.measured import MEASURED, with_measured
 from workflow.shell.analysis import Pictures
 from workflow.shell.output.curves import Curve
@@ -29,8 +30,14 @@ from workflow.shell.output.measured import (
 )
 from workflow.shell.output.quantities import CurvesOf
 
-DEPTH = CurvesOf("depth", "kinetics/cycles", "kinetics/*/depth", ("1", "mm"))
-VOLUME = CurvesOf("volume", "kinetics/cycles", "kinetics/*/volume", ("1", "mm^3"))
+DEPTH = CurvesOf("depth", "kinetics/cycles", "kinetics/*/depth")
+VOLUME = CurvesOf("volume", "kinetics/cycles", "kinetics/*/volume")
+LAYOUT = Layout(
+    {
+        "kinetics": {"cycles": Declared("1", "cycles", ("cycles",))},
+        "kinetics/<face>": {"depth": Declared("mm", "worn depth", ("cycles",))},
+    }
+)
 INLINE = {"curve": "depth", "at": [100.0], "values": ["3 um"], "source": "made up"}
 
 
@@ -155,7 +162,7 @@ def case_of(*measured: Measured) -> Case:
 
 def test_what_cannot_be_compared_is_a_warning_not_the_end_of_a_run(results: Path) -> None:
     case = case_of(entry(), entry(curve="depth, flank"))
-    check_measured(case, [DEPTH])
+    check_measured(case, [DEPTH], LAYOUT)
     good, nowhere = tell_measured(case, [DEPTH, VOLUME], results)
     assert good["curve"] == "depth, pad"
     assert good["mean_deviation"] == pytest.approx(-3e-3 + 3e-5)
@@ -175,7 +182,7 @@ def test_what_cannot_be_compared_is_a_warning_not_the_end_of_a_run(results: Path
 )
 def test_what_is_of_no_curve_is_refused_before_a_run(given: dict[str, Any], wrong: str) -> None:
     with pytest.raises(UserError, match=wrong):
-        check_measured(case_of(entry(**given)), [DEPTH])
+        check_measured(case_of(entry(**given)), [DEPTH], LAYOUT)
 
 
 def test_points_are_drawn_where_the_curve_is_and_nowhere_else(results: Path) -> None:

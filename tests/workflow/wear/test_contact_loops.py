@@ -17,6 +17,7 @@ from tests.workflow.shell.interruptions import ctrl_c_after_jumps
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.figures import wear as figures
+from workflow.analyses.wear.output.layout import LAYOUT
 from workflow.analyses.wear.output.loop_table import COLUMNS
 from workflow.analyses.wear.worn.contact_loops import (
     MEASURED,
@@ -167,8 +168,8 @@ def with_loops(root, loop, line=False):
     for jump in range(3):
         arrays = kept_loops(["sphere"], [loop]) if jump != 1 else {"other": np.zeros(1)}
         write_arrays(folder.jump(jump), arrays, {"cycles": 100.0 * jump})
-    with writing(folder.results, line) as writer:
-        write_loops(writer, folder, 2, line)
+    with writing(folder.results, LAYOUT, line) as writer:
+        write_loops(writer, folder, 2)
         writer.put_grid("grid/sphere", Grid((32, 32), (0.1, 0.1)))
     return folder
 

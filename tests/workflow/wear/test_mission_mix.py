@@ -7,7 +7,7 @@ import pytest
 
 from sa_solver.types import LoadHistory
 from tests.workflow.conftest import Run, invoke
-from workflow.analyses.contact.output.datasets import load_columns
+from workflow.analyses.contact.output.layout import load_columns
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.analyses.wear.structures.resultants.reading import read_resultants

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.contact.case import BodiesCase, ContactCase, LineContactCase
 from workflow.analyses.contact.memory import memory
+from workflow.analyses.contact.output.layout import LAYOUT, ContactContents
 from workflow.analyses.contact.output.quantities import CURVES, main_results
 from workflow.analyses.contact.run_time import run_time
 from workflow.shell.analysis import Analysis, ChartComparison, Pictures, Run, Summary, expected
@@ -37,7 +38,6 @@ def _quantities(case: BodiesCase, summary: Summary) -> list[str]:
 
 
 def _pictures() -> Pictures:
-    from workflow.analyses.contact.output.datasets import ContactContents
     from workflow.analyses.contact.output.paraview import write_contact
 
     return Pictures(_figures_of, write_contact, contents=ContactContents)
@@ -57,6 +57,7 @@ ANALYSIS: Analysis[BodiesCase] = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    layout=lambda case: LAYOUT,
     quantities=main_results,
     curves=CURVES,
     comparison=ChartComparison(quantities=_quantities, at_the_end=AT_THE_END),

@@ -1,6 +1,7 @@
 """Two specimens of a friction rig, reduced, and worn under each normal force."""
 
 from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.specimens.layout import LAYOUT
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.quantities import CURVES, main_results
 from workflow.analyses.specimens.run_time import run_time
@@ -31,6 +32,7 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    layout=lambda case: LAYOUT,
     quantities=main_results,
     curves=CURVES,
     resumable=True,

@@ -29,20 +29,14 @@ CURVES = (
         "tangential stiffness",
         "loads/*/kinetics/cycles",
         "loads/*/kinetics/stick_stiffness",
-        ("1", "N/mm"),
     ),
-    CurvesOf("contact area", "loads/*/kinetics/cycles", "loads/*/kinetics/area", ("1", "mm^2")),
-    CurvesOf(
-        "depth worn from body 1", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_1", ("1", "mm")
-    ),
-    CurvesOf(
-        "depth worn from body 2", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_2", ("1", "mm")
-    ),
+    CurvesOf("contact area", "loads/*/kinetics/cycles", "loads/*/kinetics/area"),
+    CurvesOf("depth worn from body 1", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_1"),
+    CurvesOf("depth worn from body 2", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_2"),
     CurvesOf(
         "loop, worn",
         "loads/*/states/-1/loop/ring_displacement",
         "loads/*/states/-1/loop/ring_force",
-        ("mm", "N"),
     ),
 )
 

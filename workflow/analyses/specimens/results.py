@@ -14,6 +14,7 @@ from fe_models.joints.reduction import ReducedModel, save_reduced
 from fe_models.matrices import write_matrices
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.specimens.layout import LAYOUT, PAD
 from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
 from workflow.analyses.specimens.summary import (
     SLOPE_SHARE,
@@ -27,49 +28,15 @@ from workflow.analyses.specimens.summary import (
     tied_pad,
 )
 from workflow.analyses.specimens.wear import BlockState
-from workflow.analyses.wear.output.datasets import cycles_column, face_mesh, kinetics_columns
+from workflow.analyses.wear.output.datasets import kinetics_columns, mesh_of
 from workflow.shell.analysis import Run
 from workflow.shell.folders.store import replacing_hdf5
-from workflow.shell.output.dataset import Dataset, described
-from workflow.shell.output.results import CurveAxis, On, ResultsWriter, run_results
+from workflow.shell.output.results import ResultsWriter, run_results
 from workflow.shell.output.summary import finish
 from workflow.shell.terminal.reporter import Reporter
 
-# Name of the pad's grid, and of the two shapes that are compared with a half-space.
-PAD = "pad"
+# The two shapes that are compared with a half-space.
 SHAPES = "unworn", "worn"
-
-# Unit and description of results.
-FREQUENCIES = {
-    "full": ("Hz", "natural frequencies of the free body, finite elements"),
-    "reduced": ("Hz", "natural frequencies of the free body, reduced model"),
-}
-KINETICS = {
-    "energy_per_cycle": ("N mm", "energy dissipated in a cycle"),
-    "stick_stiffness": ("N/mm", "tangential stiffness with all that touches stuck"),
-    "approach": ("mm", "motion of body 1 towards body 2"),
-    "peak_pressure": ("MPa", "largest pressure"),
-    "pressure_deviation": ("1", "root mean square of pressure/mean - 1 over the pad"),
-    "friction": ("1", "largest tangential over normal force"),
-    # Infinite where no node slides.
-    "stable_cycles": ("1", "cycles of constant shape beyond which errors of shape grow"),
-}
-# Fields at the nodes of the pad or the cells of its grid; tractions are those of first loading.
-PAD_FIELDS = {
-    "pressure": ("MPa", "contact pressure"),
-    "shear_x": ("MPa", "shear on body 2 along x at the end of first loading"),
-    "cycle_slip": ("mm", "path of slip along x in a cycle"),
-}
-NODAL_FIELDS = {
-    "gap": ("mm", "distance of the deformed faces"),
-    "worn_1": ("mm", "worn depth of body 1"),
-    "worn_2": ("mm", "worn depth of body 2"),
-    "secant_stiffness": ("N/mm", "slope of the loop up to half of its largest force"),
-}
-RING_LOOP = {
-    "ring_displacement": ("mm", "motion of body 2's ring along x"),
-    "ring_force": ("N", "force along x that moves body 2's ring"),
-}
 
 
 def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
@@ -101,68 +68,75 @@ def _write_matrices(model: ReducedModel, folder: Path, stem: str, formats: tuple
 
 def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
     case, face, areas = run.case, outcome.model.face, outcome.model.pair.areas
-    with run_results(run, case, {"friction": case.friction.coefficient}) as writer:
+    attributes = {"friction": case.friction.coefficient}
+    with run_results(run, case, LAYOUT, attributes) as writer:
         writer.put_contents(None)
         writer.put_grid(f"grid/{PAD}", outcome.half_space.grid, face.frame)
-        shares = {"area": Dataset(areas, "mm^2", "of contact that belongs to each node")}
-        writer.put("specimens/pad", face_mesh(face) | shares)
-        for number, both in enumerate(outcome.model.reduction.frequencies, 1):
-            writer.put(f"specimens/body_{number}", described(FREQUENCIES, both))
+        writer.put("specimens/pad", {**mesh_of(face), "area": areas})
+        for number, (full, reduced) in enumerate(outcome.model.reduction.frequencies, 1):
+            writer.put(f"specimens/body_{number}", {"full": full, "reduced": reduced})
         for number, load in enumerate(outcome.loads):
             _put_load(writer, f"loads/{number}", load, areas)
 
 
 def _put_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array) -> None:
     writer.put(group, {}, normal_force=load.force, unit="N")
-    writer.put(f"{group}/kinetics", _kinetics(load.blocks, areas), CurveAxis("cycles"))
+    writer.put(f"{group}/kinetics", _kinetics(load.blocks, areas))
     for number, kept in enumerate(load.kept):
         name, loop = f"{group}/states/{number:05d}", masing_loop(kept.curve)
         numbers = {"cycles": kept.block.cycles, "energy": kept.block.energy}
         writer.put(name, _state(kept, areas), **numbers)
-        writer.put(f"{name}/loop", described(RING_LOOP, (loop.displacement, loop.force)))
+        _put_loop(writer, f"{name}/loop", loop.displacement, loop.force)
     for shape, beside in zip(SHAPES, load.half_space, strict=True):
-        name = f"{group}/half_space/{shape}"
-        fields = beside.pressure, beside.shear, 4.0 * beside.slip
-        first_loading = beside.displacement, beside.force
-        writer.put(name, described(PAD_FIELDS, fields), On(f"grid/{PAD}"))
-        writer.put(f"{name}/first_loading", described(RING_LOOP, first_loading))
-    marched = load.marched.displacement, load.marched.force
-    writer.put(f"{group}/coupled_cycle", described(RING_LOOP, marched))
+        name, path = f"{group}/half_space/{shape}", 4.0 * beside.slip
+        fields = {"pressure": beside.pressure, "shear_x": beside.shear, "cycle_slip": path}
+        writer.put(name, fields)
+        _put_loop(writer, f"{name}/first_loading", beside.displacement, beside.force)
+    _put_loop(writer, f"{group}/coupled_cycle", load.marched.displacement, load.marched.force)
 
 
-def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Dataset]:
+def _put_loop(writer: ResultsWriter, group: str, displacement: Array, force: Array) -> None:
+    writer.put(group, {"ring_displacement": displacement, "ring_force": force})
+
+
+def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Array]:
     """Return numbers at the start of every cycle block, ``(blocks + 1,)`` each."""
     worn = [
         (*(d.max() for d in state.depths), *(d @ areas for d in state.depths), state.energy)
         for state in blocks
     ]
     rows = [
-        (
-            state.contact.energy,
-            state.contact.stick_stiffness,
-            state.contact.normal.approach,
-            state.contact.normal.pressure.max(),
-            pressure_deviation(areas, state.contact.normal.pressure),
-            state.contact.friction,
-            state.stable_cycles,
-        )
+        {
+            "energy_per_cycle": state.contact.energy,
+            "stick_stiffness": state.contact.stick_stiffness,
+            "approach": state.contact.normal.approach,
+            "peak_pressure": state.contact.normal.pressure.max(),
+            "pressure_deviation": pressure_deviation(areas, state.contact.normal.pressure),
+            "friction": state.contact.friction,
+            "stable_cycles": state.stable_cycles,
+        }
         for state in blocks
     ]
     return {
-        "cycles": cycles_column(np.array([state.cycles for state in blocks])),
+        "cycles": np.array([state.cycles for state in blocks]),
         **kinetics_columns(np.array(worn), np.array([s.contact.normal.area for s in blocks])),
-        **described(KINETICS, np.array(rows).T),
+        **{name: np.array([row[name] for row in rows]) for name in rows[0]},
     }
 
 
-def _state(kept: KeptState, areas: Array) -> dict[str, Dataset]:
+def _state(kept: KeptState, areas: Array) -> dict[str, Array]:
     """Return fields of the pad in a worn state, at its nodes."""
     block, contact = kept.block, kept.block.contact
-    fields = contact.normal.pressure, contact.tangential.shear / areas, contact.cycle_slip
-    secant = np.array(kept.curve.secant_stiffness(SLOPE_SHARE))
-    return described(PAD_FIELDS, fields) | described(
-        NODAL_FIELDS, (contact.normal.gap, *block.depths, secant)
-    )
+    worn_1, worn_2 = block.depths
+    return {
+        "pressure": contact.normal.pressure,
+        "shear_x": contact.tangential.shear / areas,
+        "cycle_slip": contact.cycle_slip,
+        "gap": contact.normal.gap,
+        "worn_1": worn_1,
+        "worn_2": worn_2,
+        "secant_stiffness": np.array(kept.curve.secant_stiffness(SLOPE_SHARE)),
+    }
 
 
 # --- summary ------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.analyses.time.memory import memory
+from workflow.analyses.time.outcome import LAYOUT, MotionContents
 from workflow.analyses.time.quantities import CURVES, main_results
 from workflow.analyses.time.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
@@ -19,7 +20,6 @@ def _run(run: Run[JointCase | RigCase]) -> None:
 def _pictures() -> Pictures:
     # Imported here, as plotting takes a second to load.
     from workflow.analyses.time.figures import figures_of
-    from workflow.analyses.time.outcome import MotionContents
 
     return Pictures(figures_of, contents=MotionContents)
 
@@ -31,6 +31,7 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    layout=lambda case: LAYOUT,
     quantities=main_results,
     curves=CURVES,
     resumable=True,

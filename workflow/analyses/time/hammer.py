@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fe_models.dynamics.excitation import HammerBlow
 from fe_models.dynamics.motion import Motion
@@ -17,7 +16,6 @@ from fe_models.dynamics.transient.impact_hammer import (
     frequency_response,
 )
 from sa_solver.steps import Steps
-from sa_solver.types import Array
 from workflow.analyses.rig import excitation as given
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint import evolution_curve
@@ -31,8 +29,8 @@ from workflow.analyses.time.motion import (
 )
 from workflow.analyses.time.outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
 from workflow.errors import MethodFailed
+from workflow.layout.declared import Arrays
 from workflow.models.rig.rig_model import RigModel
-from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import Reporter
 
 # The second mode is searched between these multiples of its frequencies without the joint and with
@@ -114,21 +112,15 @@ def _state(
     seen = response.frequency <= hammer.highest
     curves = {
         MOTION: motion_curves(rig, motion, blow),
-        RESPONSE: _response(response.frequency[seen], response.value[seen]),
+        RESPONSE: {
+            "frequency": response.frequency[seen],
+            "magnitude": np.abs(response.value[seen]),
+            "phase": np.angle(response.value[seen]),
+        },
     }
     if decay is not None:
         curves[RING_DOWN] = decay
     return State(energy, None, joint.parameters(energy), numbers, curves)
-
-
-def _response(frequency: Array, value: NDArray[np.complex128]) -> dict[str, Dataset]:
-    """Return datasets of a frequency response ``(n,)``."""
-    size = "acceleration of what is looked at, over the excitation"
-    return {
-        "frequency": Dataset(frequency, "Hz", "frequency"),
-        "magnitude": Dataset(np.abs(value), "mm/(s^2 N)", size),
-        "phase": Dataset(np.angle(value), "rad", "of the acceleration before the excitation"),
-    }
 
 
 def _peak(
@@ -158,7 +150,7 @@ def _decay_time(motion: Motion) -> float:
 
 def _ring_down(
     rig: RigModel, motion: Motion, hammer: given.Hammer, energy: float, reporter: Reporter
-) -> dict[str, Dataset] | None:
+) -> Arrays | None:
     """Return frequency and damping of the first mode against its amplitude.
 
     They are found from the acceleration, as in measurements, so that creep of the joint does not
@@ -176,20 +168,19 @@ def _ring_down(
         reporter.warn(f"no ring-down at {joules(energy)}: {TOO_SHORT}")
         return None
     kept = np.unique(np.linspace(0, len(amplitude) - 1, RING_DOWN_POINTS).astype(int))
-    size = "amplitude of what is looked at, in its first mode"
     return {
-        "amplitude": Dataset(amplitude[kept], "mm", size),
-        "frequency": Dataset(decay.frequency[kept], "Hz", "instantaneous frequency"),
-        "damping_ratio": Dataset(decay.damping_ratio[kept], "1", "instantaneous damping ratio"),
+        "amplitude": amplitude[kept],
+        "frequency": decay.frequency[kept],
+        "damping_ratio": decay.damping_ratio[kept],
     }
 
 
-def _ends(decay: Datasets | None) -> dict[str, dict[str, float]] | None:
+def _ends(decay: Arrays | None) -> dict[str, dict[str, float]] | None:
     """Return a ring-down where it is largest and where it is smallest."""
     if decay is None:
         return None
     return {
-        when: {name: float(curve.values[place]) for name, curve in decay.items()}
+        when: {name: float(curve[place]) for name, curve in decay.items()}
         for when, place in (("largest", 0), ("smallest", -1))
     }
 

@@ -24,10 +24,10 @@ from wear.joints.measured.loop_record import MeasuredLoopError
 from wear.joints.measured.measured_loops import measure_loops
 from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import JointModel
-from workflow.analyses.time.outcome import LOOP, PARAMETERS, State, TimeOutcome, loop_curves
+from workflow.analyses.time.outcome import LOOP, State, TimeOutcome
 from workflow.errors import MethodFailed, UserError
+from workflow.layout.declared import Arrays
 from workflow.models.rig.laws import Laws
-from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
 # Points of a loop: those of a cosine over a cycle, dense at the reversals.
@@ -74,7 +74,7 @@ def _state(model: JointModel, energy: float, cycles: float, amplitude: float) ->
         "force": 0.5 * float(np.ptp(force)),
         "extracted": extracted(displacement, force, parameters["normal_load"]),
     }
-    curves = {LOOP: loop_curves(displacement, force)}
+    curves = {LOOP: {"displacement": displacement, "force": force}}
     return State(energy, cycles, parameters, numbers, curves)
 
 
@@ -157,7 +157,7 @@ def evolution_curve(
     last: float,
     test: LongTest | None = None,
     rate: Callable[[float], float] | None = None,
-) -> dict[str, Dataset]:
+) -> Arrays:
     """Return parameters over the energy up to the ``last``, with cycles if the joint is aged.
 
     Cycles come with the energy per cycle.
@@ -167,16 +167,12 @@ def evolution_curve(
         even = np.linspace(0.0, last, CURVE_POINTS)
         energy = np.union1d(even, np.geomspace(CURVE_BEGIN * last, last, CURVE_POINTS)[:-1])
     parameters = [model.parameters(dissipated) for dissipated in energy.tolist()]
-    curve = {"energy": Dataset(energy, "N mm", "energy dissipated so far in the joint")}
+    curve = {"energy": energy}
     if test is not None and rate is not None:
         per_cycle = np.array([rate(dissipated) for dissipated in energy.tolist()])
-        curve |= {
-            "cycles": Dataset(test.cycles_at(energy), "1", "cycles so far"),
-            "energy_per_cycle": Dataset(per_cycle, "N mm", "energy dissipated in a cycle"),
-        }
+        curve |= {"cycles": test.cycles_at(energy), "energy_per_cycle": per_cycle}
     return curve | {
-        name: Dataset(np.array([values[name] for values in parameters]), *PARAMETERS[name])
-        for name in parameters[0]
+        name: np.array([values[name] for values in parameters]) for name in parameters[0]
     }
 
 

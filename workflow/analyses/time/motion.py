@@ -14,9 +14,9 @@ from sa_solver.steps import COMPUTED, Steps
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.errors import MethodFailed
-from workflow.models.rig.motion import CLOCK, CURVES, LARGEST_ERROR, MotionModel, curves_of
+from workflow.layout.declared import Arrays
+from workflow.models.rig.motion import LARGEST_ERROR, MotionModel, curves_of
 from workflow.models.rig.rig_model import RigModel
-from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -69,20 +69,10 @@ def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
     }
 
 
-def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict[str, Dataset]:
+def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> Arrays:
     """Return the curves of a motion."""
-    values = curves_of(rig, force, motion)
-    curves = {
-        name: Dataset(values[name], declared.unit, declared.description)
-        for name, declared in {"time": CLOCK, **CURVES}.items()
-    }
+    of_entries = {}
     if len(rig.entries) > 1:
         moved, pulled = rig.by_entry(motion)
-        of_each = "of the joints of each entry of structure.joints"
-        curves |= {
-            "joints_displacement": Dataset(moved, "mm", f"mean displacement {of_each}"),
-            "joints_force": Dataset(pulled, "N", f"sum of the forces {of_each}, resisting"),
-        }
-        # Tables have the energy last.
-        curves["dissipated"] = curves.pop("dissipated")
-    return curves
+        of_entries = {"joints_displacement": moved, "joints_force": pulled}
+    return {**curves_of(rig, force, motion), **of_entries}

@@ -6,27 +6,71 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from sa_solver.types import Array
 from workflow.analyses.time.case import JointCase, RigCase
-from workflow.shell.output.dataset import Dataset, Datasets
-from workflow.shell.output.results import CurveAxis
+from workflow.layout.declared import Arrays, Layout, over
 
 # The parameters of a joint that evolve, in the order of reports.
-PARAMETERS = {
-    "friction": ("1", "coefficient of friction"),
-    "stiffness": ("N/mm", "slope of the stuck joint"),
-    "residual_stiffness": ("N/mm", "slope of the sliding joint"),
-    "normal_load": ("N", "normal load"),
-}
+PARAMETERS = over(
+    "",
+    friction=("1", "coefficient of friction"),
+    stiffness=("N/mm", "slope of the stuck joint"),
+    residual_stiffness=("N/mm", "slope of the sliding joint"),
+    normal_load=("N", "normal load"),
+)
 # Groups of curves of a state.
 LOOP, MOTION, RESPONSE, RING_DOWN = "loop", "motion", "frequency_response", "ring_down"
-# First axis of each group; loops have none.
-ALONG = {
-    LOOP: None,
-    MOTION: CurveAxis("time"),
-    RESPONSE: CurveAxis("frequency"),
-    RING_DOWN: CurveAxis("amplitude"),
-}
+EVOLUTION = "evolution"
+_EACH = "of the joints of each entry of structure.joints"
+LAYOUT = Layout(
+    {
+        EVOLUTION: {
+            **over(
+                "energy",
+                energy=("N mm", "energy dissipated so far in the joint"),
+                cycles=("1", "cycles so far"),
+                energy_per_cycle=("N mm", "energy dissipated in a cycle"),
+            ),
+            **{name: declared._replace(dims=("energy",)) for name, declared in PARAMETERS.items()},
+        },
+        f"states/<state>/{LOOP}": over(
+            "point",
+            displacement=("mm", "displacement of the joint, or the mean of several, in a cycle"),
+            force=("N", "force that resists it"),
+        ),
+        f"states/<state>/{MOTION}": {
+            **over("time", time=("s", "time"), excitation=("N", "force of the excitation")),
+            **over(
+                "time seen",
+                displacement=("mm", "displacements of what is seen"),
+                acceleration=("mm/s^2", "accelerations of what is seen"),
+            ),
+            **over(
+                "time", joint_force=("N", "force of the joint, or the sum of several, resisting")
+            ),
+            **over(
+                "time entry",
+                joints_displacement=("mm", f"mean displacement {_EACH}"),
+                joints_force=("N", f"sum of the forces {_EACH}, resisting"),
+            ),
+            **over(
+                "time",
+                dissipated=("N mm", "energy that the joint has dissipated since the beginning"),
+            ),
+        },
+        f"states/<state>/{RESPONSE}": over(
+            "frequency",
+            frequency=("Hz", "frequency"),
+            magnitude=("mm/(s^2 N)", "acceleration of what is looked at, over the excitation"),
+            phase=("rad", "of the acceleration before the excitation"),
+        ),
+        f"states/<state>/{RING_DOWN}": over(
+            "amplitude",
+            amplitude=("mm", "amplitude of what is looked at, in its first mode"),
+            frequency=("Hz", "instantaneous frequency"),
+            damping_ratio=("1", "instantaneous damping ratio"),
+        ),
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -34,14 +78,14 @@ class State:
     """The joint after a dissipated ``energy`` [N mm] and a number of ``cycles``, if known.
 
     ``parameters`` are by the names of :data:`PARAMETERS`, ``numbers`` are for the summary, and
-    ``curves`` are by group, with the first axis of each along the curve.
+    ``curves`` are by group, each an array by name.
     """
 
     energy: float
     cycles: float | None
     parameters: Mapping[str, float]
     numbers: Mapping[str, Any]
-    curves: Mapping[str, Datasets]
+    curves: Mapping[str, Arrays]
 
 
 @dataclass(frozen=True)
@@ -55,7 +99,7 @@ class TimeOutcome:
 
     case: JointCase | RigCase
     states: tuple[State, ...]
-    evolution: Datasets
+    evolution: Arrays
     numbers: Mapping[str, Any] = field(default_factory=dict)
     seen: tuple[str, ...] = ()
 
@@ -66,7 +110,7 @@ class TimeOutcome:
         for number, state in enumerate(self.states):
             for group in state.curves:
                 curves[group] = (*curves.get(group, ()), f"{number:05d}")
-        changes = len(self.evolution["energy"].values) > 1
+        changes = len(self.evolution["energy"]) > 1
         evolution = tuple(self.evolution) if changes else ()
         return MotionContents(curves, evolution, aged=self.states[0].cycles is not None)
 
@@ -82,12 +126,3 @@ class MotionContents:
     curves: Mapping[str, tuple[str, ...]]
     evolution: tuple[str, ...]
     aged: bool
-
-
-def loop_curves(displacement: Array, force: Array) -> dict[str, Dataset]:
-    """Return a loop of the joint, or of several together."""
-    moved = "displacement of the joint, or the mean of several, in a cycle"
-    return {
-        "displacement": Dataset(displacement, "mm", moved),
-        "force": Dataset(force, "N", "force that resists it"),
-    }

@@ -34,27 +34,21 @@ NUMBERS = {
 MOVED = "stroke", "largest_displacement"
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
-    CurvesOf("cycles", "evolution/energy", "evolution/cycles", ("N mm", "1")),
-    CurvesOf("stiffness of the joint", "evolution/energy", "evolution/stiffness", ("N mm", "N/mm")),
-    CurvesOf("friction of the joint", "evolution/energy", "evolution/friction", ("N mm", "1")),
-    CurvesOf(
-        "normal load of the joint", "evolution/energy", "evolution/normal_load", ("N mm", "N")
-    ),
-    CurvesOf(
-        "loop in the last state", "states/-1/loop/displacement", "states/-1/loop/force", ("mm", "N")
-    ),
+    CurvesOf("cycles", "evolution/energy", "evolution/cycles"),
+    CurvesOf("stiffness of the joint", "evolution/energy", "evolution/stiffness"),
+    CurvesOf("friction of the joint", "evolution/energy", "evolution/friction"),
+    CurvesOf("normal load of the joint", "evolution/energy", "evolution/normal_load"),
+    CurvesOf("loop in the last state", "states/-1/loop/displacement", "states/-1/loop/force"),
     CurvesOf(
         "frequency response in the last state",
         "states/-1/frequency_response/frequency",
         "states/-1/frequency_response/magnitude",
-        ("Hz", "mm/(s^2 N)"),
         logarithmic=True,
     ),
     CurvesOf(
         "damping in the ring-down, last state",
         "states/-1/ring_down/amplitude",
         "states/-1/ring_down/damping_ratio",
-        ("mm", "1"),
     ),
 )
 
@@ -96,5 +90,6 @@ def _of_state(number: int, when: str, summary: Summary) -> Iterator[SummaryQuant
         if name == "cycles":
             known = _of_ageing(summary)
         yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
-    for name, (unit, text) in PARAMETERS.items():
-        yield of(text, f"{place}.{name}", unit, everyday="N/um" if name in STIFFNESSES else "")
+    for name, declared in PARAMETERS.items():
+        everyday = "N/um" if name in STIFFNESSES else ""
+        yield of(declared.description, f"{place}.{name}", declared.unit, everyday=everyday)

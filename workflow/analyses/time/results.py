@@ -6,16 +6,14 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from workflow.analyses.time.case import JointCase, RigCase, TimeCase, joules
-from workflow.analyses.time.outcome import ALONG, MOTION, State, TimeOutcome
+from workflow.analyses.time.outcome import EVOLUTION, LAYOUT, MOTION, State, TimeOutcome
 from workflow.case.fields import in_unit_of
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.results import CurveAxis, run_results
+from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish, number_at
 from workflow.shell.output.tables import write_curves
 from workflow.shell.terminal.reporter import Reporter
-
-EVOLUTION = "evolution"
 
 TimeRun = Run[JointCase | RigCase]
 
@@ -37,16 +35,16 @@ def write_time_output(outcome: TimeOutcome, run: TimeRun) -> None:
 def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
     case = outcome.case
     attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": outcome.seen or None}
-    with run_results(run, case, attributes) as writer:
+    with run_results(run, case, LAYOUT, attributes) as writer:
         writer.put_contents(outcome.contents)
-        writer.put(EVOLUTION, outcome.evolution, CurveAxis("energy"))
+        writer.put(EVOLUTION, outcome.evolution)
         for number, state in enumerate(outcome.states):
             place = f"states/{number:05d}"
             scalars = {k: v for k, v in state.numbers.items() if isinstance(v, int | float | list)}
             parameters = {"energy": state.energy, "cycles": state.cycles, **state.parameters}
             writer.put(place, {}, **(parameters | scalars))
             for group, curves in state.curves.items():
-                writer.put(f"{place}/{group}", curves, ALONG[group])
+                writer.put(f"{place}/{group}", curves)
 
 
 def _write_tables(outcome: TimeOutcome, folder: OutputFolder) -> None:
@@ -55,12 +53,15 @@ def _write_tables(outcome: TimeOutcome, folder: OutputFolder) -> None:
     Motions are left out, as they are too long.
     """
     what = "parameters of the joint over the energy it has dissipated"
-    write_curves(folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution)
+    write_curves(
+        folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution, LAYOUT.datasets(EVOLUTION)
+    )
     for number, state in enumerate(outcome.states):
         for group, curves in state.curves.items():
             if group != MOTION:
                 what = f"{group.replace('_', ' ')} at {joules(state.energy)}"
-                write_curves(folder.reserve(f"{group}_{number:05d}.csv", what), curves)
+                path, place = folder.reserve(f"{group}_{number:05d}.csv", what), f"states/-/{group}"
+                write_curves(path, curves, LAYOUT.datasets(place))
 
 
 # --- summary ------------------------------------------------------------------------------------

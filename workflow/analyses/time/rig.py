@@ -30,7 +30,7 @@ from workflow.analyses.time.motion import (
     step_control,
     warn_of_steps,
 )
-from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome, loop_curves
+from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome
 from workflow.errors import MethodFailed
 from workflow.models.rig.rig_model import RigModel
 from workflow.shell.terminal.reporter import Reporter
@@ -155,7 +155,7 @@ def _steady_state(
         "change": cycle.change,
         "step_error": cycle.error,
     }
-    curves = {LOOP: loop_curves(cycle.stretch, cycle.force)}
+    curves = {LOOP: {"displacement": cycle.stretch, "force": cycle.force}}
     return State(energy, cycles, parameters, numbers, curves)
 
 

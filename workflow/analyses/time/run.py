@@ -29,5 +29,5 @@ def run_time(run: Run[JointCase | RigCase]) -> None:
                 outcome = run_rig(case, reporter, steps)
     except JointError as error:
         raise UserError(f"{folder.case}: joint: {error}") from error
-    warn_of_table(case, float(outcome.evolution["energy"].values[-1]), reporter)
+    warn_of_table(case, float(outcome.evolution["energy"][-1]), reporter)
     write_time_output(outcome, run)

@@ -4,6 +4,8 @@ from itertools import product
 
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.memory import memory
+from workflow.analyses.vibration.output.layout import layout_of
+from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.analyses.vibration.output.quantities import CURVES, main_results
 from workflow.analyses.vibration.run_time import run_time
 from workflow.shell.analysis import Analysis, ChartComparison, Pictures, Run, Summary
@@ -30,7 +32,6 @@ def _quantities(case: VibrationCase, summary: Summary) -> list[str]:
 def _pictures() -> Pictures:
     # Imported here, as plotting takes a second to load.
     from workflow.analyses.vibration.figures.response import figures_of
-    from workflow.analyses.vibration.output.outcome import VibrationContents
     from workflow.analyses.vibration.output.paraview import write_vibration
 
     return Pictures(figures_of, write_vibration, contents=VibrationContents)
@@ -43,6 +44,7 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    layout=lambda case: layout_of(case.amount),
     quantities=main_results,
     curves=CURVES,
     resumable=True,

@@ -13,12 +13,12 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import accuracy_of, step_control
-from workflow.analyses.vibration.output.harmonics import ANSWER, harmonics_of
-from workflow.analyses.vibration.output.outcome import Answers
-from workflow.analyses.vibration.response import motion_datasets, warn_of_error
-from workflow.models.vibration.motions import accurate
+from workflow.analyses.vibration.output.harmonics import harmonics_of
+from workflow.analyses.vibration.output.outcome import ANSWER, Answers
+from workflow.analyses.vibration.response import warn_of_error
+from workflow.layout.declared import Arrays
+from workflow.models.vibration.motions import accurate, motion_columns
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import Reporter
 
 # Share of the vibration. A motion that changes more as harmonics are added is another one.
@@ -34,7 +34,7 @@ def answers_under(
     branch: ResponseBranch,
     reporter: Reporter,
     steps: Steps,
-) -> tuple[Answers | None, dict[str, Datasets]]:
+) -> tuple[Answers | None, dict[str, Arrays]]:
     """Return the motions of a branch at the frequencies of a case, and their harmonics by group.
 
     Returns None and no harmonics where the case asks for no frequencies. A frequency that the curve
@@ -63,7 +63,7 @@ def answers_under(
             warn_of_error(named, motion["error"], case, reporter)
         numbers.append({"frequency": frequency, "motions": those, "message": message})
         every += motions
-    harmonics: dict[str, Datasets] = {
+    harmonics: dict[str, Arrays] = {
         ANSWER.format(number): harmonics_of(model.rig, motion)
         for number, motion in enumerate(every)
     }
@@ -100,12 +100,12 @@ def _message(branch: ResponseBranch, frequency: float, found: tuple[HarmonicSolu
 def _numbers(
     model: VibratingStructure, branch: ResponseBranch, motion: HarmonicSolution
 ) -> dict[str, Any]:
-    columns = motion_datasets(model, branch.problem, [motion])
+    columns = motion_columns(model, branch.problem, [motion])
     assert motion.error is not None
     return {
-        "amplitude": float(columns["amplitude"].values[0, -1]),
-        **{name: float(columns[name].values[0]) for name in TOLD},
-        **{name: float(columns[name].values[0, -1]) for name in GROUND if name in columns},
+        "amplitude": float(columns["amplitude"][0, -1]),
+        **{name: float(columns[name][0]) for name in TOLD},
+        **{name: float(columns[name][0, -1]) for name in GROUND if name in columns},
         "error": motion.error.largest,
         "residual": motion.residual,
         "harmonics": list(motion.resolution.harmonics),
@@ -115,17 +115,14 @@ def _numbers(
 
 def _table(
     model: VibratingStructure, branch: ResponseBranch, motions: list[HarmonicSolution]
-) -> dict[str, Dataset]:
+) -> Arrays:
     frequency = np.array([motion.frequency for motion in motions])
-    columns = motion_datasets(model, branch.problem, motions)
+    columns = motion_columns(model, branch.problem, motions)
     errors = np.array([motion.error.largest for motion in motions if motion.error is not None])
-    amplitude = columns["amplitude"].values.reshape(-1, len(model.rig.seen))
-    seen = Dataset(amplitude, "mm", columns["amplitude"].description)
-    said = "of the joints' vibration or the energy lost, by harmonics and samples"
     return {
-        "frequency": Dataset(frequency, "Hz", "of the force; motions in the order of the curve"),
-        "amplitude": seen,
+        "frequency": frequency,
+        "amplitude": columns["amplitude"].reshape(-1, len(model.rig.seen)),
         **{name: columns[name] for name in GROUND if name in columns},
         **{name: columns[name] for name in TOLD},
-        "error": Dataset(errors, "1", f"estimated error {said}"),
+        "error": errors,
     }

@@ -82,7 +82,7 @@ def _curves(
         steps,
     )
     curves = curves_of(case, model, branch)
-    sizes = curves["amplitude"].values[:, -1]
+    sizes = curves["amplitude"][:, -1]
     numbers: dict[str, Any] = {
         case.amount.name: force,
         "points": len(branch.solutions),

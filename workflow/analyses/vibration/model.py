@@ -23,13 +23,12 @@ from workflow.analyses.vibration.memory import memory
 from workflow.analyses.vibration.output.outcome import RING
 from workflow.case.sections import Case
 from workflow.errors import UserError
+from workflow.layout.declared import Arrays
 from workflow.models.rig.laws import Laws, law_of_all
 from workflow.models.rig.rig_model import RigModel
-from workflow.models.vibration.amount import FORCE
 from workflow.models.vibration.model import VibrationModel
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.models.vibration.sweep import FrequencySweep
-from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -138,7 +137,7 @@ def structure_numbers(structure: VibratingStructure) -> dict[str, Any]:
     return numbers
 
 
-def diameters(structure: VibratingStructure) -> dict[str, Dataset] | None:
+def diameters(structure: VibratingStructure) -> Arrays | None:
     """Return natural frequencies by nodal diameters for a sector of a ring, else None."""
     rig = structure.rig
     if rig.sector is None:
@@ -146,32 +145,17 @@ def diameters(structure: VibratingStructure) -> dict[str, Dataset] | None:
     return frequencies_by_diameters(rig.sector, rig.stuck(structure.law, structure.resting))
 
 
-def contact_at_rest(structure: VibratingStructure) -> dict[str, Dataset] | None:
+def contact_at_rest(structure: VibratingStructure) -> Arrays | None:
     """Return places of the joints and their state at rest, None if they have no places."""
     rig = structure.rig
     if rig.pressing is None:
         return None
     rest = structure.rest
     return {
-        "x": Dataset(rig.places[:, 0], "mm", "of each joint on the contact plane"),
-        "y": Dataset(rig.places[:, 1], "mm", "of each joint on the contact plane"),
-        "gap": Dataset(rig.gap, "mm", "of the bodies without load"),
-        "area": Dataset(rig.area, "mm^2", "that belongs to each joint"),
-        "normal_force": Dataset(rest.cycle.samples[0, :, 2], "N", "of each joint at rest"),
-        "normal_displacement": Dataset(
-            rest.coefficients[:, 0, 2], "mm", "closing of each joint by the load at rest"
-        ),
-    }
-
-
-def linear_limits(structure: VibratingStructure, span: tuple[float, float]) -> dict[str, Dataset]:
-    """Return the observed amplitude over force or level, with joints free and stuck."""
-    limits, amount = structure.linear(span), structure.driving.amount
-    unit, _ = amount.receptance
-    first = "" if amount is FORCE else ", of harmonic 1"
-    size = f"amplitude of what is looked at over the {amount.name}{first}"
-    return {
-        "frequency": Dataset(limits.frequency, "Hz", "frequency of the force"),
-        "free": Dataset(limits.free, unit, f"{size}, without the joints"),
-        "stuck": Dataset(limits.stuck, unit, f"{size}, all joints stuck"),
+        "x": rig.places[:, 0],
+        "y": rig.places[:, 1],
+        "gap": rig.gap,
+        "area": rig.area,
+        "normal_force": rest.cycle.samples[0, :, 2],
+        "normal_displacement": rest.coefficients[:, 0, 2],
     }

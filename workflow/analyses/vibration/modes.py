@@ -16,9 +16,9 @@ from workflow.analyses.vibration.model import step_control
 from workflow.analyses.vibration.output.outcome import Curves
 from workflow.analyses.vibration.response import LARGEST_ERROR, progress_along
 from workflow.errors import MethodFailed, UserError
+from workflow.layout.declared import Arrays
 from workflow.models.vibration.motions import amplitudes_of
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
 # Share of the largest motion of a mode, below which the observed point does not take part.
@@ -94,27 +94,16 @@ def _error(motion: ModeMotion) -> float:
     return max(motion.vibration_error, motion.frequency_error, damping)
 
 
-def _columns(model: VibratingStructure, motions: tuple[ModeMotion, ...]) -> dict[str, Dataset]:
-    def column(values: list[float], unit: str, what: str) -> Dataset:
-        return Dataset(np.array(values), unit, what)
-
+def _columns(model: VibratingStructure, motions: tuple[ModeMotion, ...]) -> Arrays:
     solutions = [motion.solution for motion in motions]
-    seen = "half of the way to and fro of what is looked at, in the order of the curve"
-    norm = "amplitude of the mode: norm of harmonic 1 by the mass"
-    fed = "of the mode, as a share of what is critical: energy lost over 2ω ∫ x'ᵀ M x' dt"
-    slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
-    richer = "estimated error by harmonics and samples"
-    return {
-        "amplitude": column([float(amplitudes_of(model, s)[-1]) for s in solutions], "mm", seen),
-        "modal_amplitude": column([motion.amplitude for motion in motions], "t^0.5 mm", norm),
-        "frequency": column([s.frequency for s in solutions], "Hz", "of the mode"),
-        "damping": column([motion.damping_ratio for motion in motions], "1", fed),
-        "energy_per_cycle": column(
-            [float(s.cycle.dissipated.sum()) for s in solutions],
-            "N mm",
-            "energy that the joints dissipate in a cycle",
-        ),
-        "slip": column([model.time_share(s, SLIP) for s in solutions], "1", slips),
-        "frequency_error": column([m.frequency_error for m in motions], "1", richer),
-        "damping_error": column([m.damping_error for m in motions], "1", f"{richer}, of the ratio"),
+    columns: dict[str, list[float]] = {
+        "amplitude": [float(amplitudes_of(model, s)[-1]) for s in solutions],
+        "modal_amplitude": [motion.amplitude for motion in motions],
+        "frequency": [s.frequency for s in solutions],
+        "damping": [motion.damping_ratio for motion in motions],
+        "energy_per_cycle": [float(s.cycle.dissipated.sum()) for s in solutions],
+        "slip": [model.time_share(s, SLIP) for s in solutions],
+        "frequency_error": [motion.frequency_error for motion in motions],
+        "damping_error": [motion.damping_error for motion in motions],
     }
+    return {name: np.array(values) for name, values in columns.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -32,14 +32,13 @@ from workflow.analyses.vibration.output.loops import loops_of
 from workflow.analyses.vibration.output.outcome import DIAMETERS, RESONANCE, Curves, Response
 from workflow.analyses.vibration.stability import stability_along
 from workflow.errors import MethodFailed
+from workflow.layout.declared import Arrays
 from workflow.models.vibration.motions import (
     amplitude_of,
     amplitudes_of,
-    declared_columns,
     motion_columns,
 )
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import FORECAST, Reporter
 
 # Error of a motion, due to harmonics and samples, that gives a warning if there is no tolerance.
@@ -100,10 +99,10 @@ def response_under(
         steps,
     )
     curves = {**curves_of(case, model, branch), **stability.columns}
-    if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
+    if int(np.argmax(curves["amplitude"][:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{told}: no resonance, the largest motion is at an end of the curve")
     reporter.doing(f"{told}: resonance")
-    resonance = sweep.resonance(model, branch, curves["amplitude"].values[:, -1], steps)
+    resonance = sweep.resonance(model, branch, curves["amplitude"][:, -1], steps)
     warn_of_stroke(model, f"{told}: at resonance", resonance, reporter)
     found = branch.problem.refined(resonance.resolution)
     response = Response(
@@ -168,17 +167,16 @@ def force_sweep(
     )
     curves = curves_of(case, model, branch)
     shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
-    along = f"{case.amount.description}, in the order of the curve"
-    datasets = {
-        case.amount.name: Dataset(branch.forces, case.amount.unit, along),
-        "amplitude": _of_the_last(curves["amplitude"]),
+    arrays = {
+        case.amount.name: branch.forces,
+        "amplitude": curves["amplitude"][:, -1],
         **{name: curves[name] for name in shared},
         **stability.columns,
     }
     folds = [float(branch.curve.parameters[place]) for place in branch.curve.folds]
     points = len(branch.solutions)
     numbers = {"frequency": frequency, "points": points, "folds": folds, "message": branch.message}
-    return Curves(datasets, numbers | stability.numbers, stability.bifurcations)
+    return Curves(arrays, numbers | stability.numbers, stability.bifurcations)
 
 
 def backbone_of(
@@ -208,24 +206,23 @@ def backbone_of(
         reporter,
         steps,
     )
-    columns = motion_datasets(model, backbone.problem, backbone.solutions)
-    resonance = "of phase resonance: what is driven lags the force by 90 degrees"
-    datasets = {
-        case.amount.name: Dataset(backbone.forces, case.amount.unit, case.amount.description),
-        "frequency": Dataset(backbone.frequencies, "Hz", resonance),
-        "amplitude": _of_the_last(columns["amplitude"]),
+    columns = motion_columns(model, backbone.problem, backbone.solutions)
+    arrays = {
+        case.amount.name: backbone.forces,
+        "frequency": backbone.frequencies,
+        "amplitude": columns["amplitude"][:, -1],
         **{name: columns[name] for name in ("damping", "energy_per_cycle", "slip")},
         **stability.columns,
     }
     numbers = {"message": backbone.message, **stability.numbers}
-    return Curves(datasets, numbers, stability.bifurcations)
+    return Curves(arrays, numbers, stability.bifurcations)
 
 
 def _numbers(
     case: VibrationCase,
     model: VibratingStructure,
     branch: ResponseBranch,
-    curves: Datasets,
+    curves: Arrays,
     problem: HarmonicBalance,
     resonance: HarmonicSolution,
 ) -> dict[str, Any]:
@@ -236,7 +233,7 @@ def _numbers(
         "resonance": resonance.frequency,
         "amplitude": float(amplitudes[-1]),
         "receptance": float(amplitudes[-1]) / resonance.force,
-        "first_amplitude": float(max(amplitudes[0], curves["amplitude"].values[:, 0].max())),
+        "first_amplitude": float(max(amplitudes[0], curves["amplitude"][:, 0].max())),
         "energy_per_cycle": float(resonance.cycle.dissipated.sum()),
         "damping": damping_ratio(problem, resonance),
         "slip": model.time_share(resonance, SLIP),
@@ -269,59 +266,28 @@ def _beside(
 
 def curves_of(
     case: VibrationCase, model: VibratingStructure, branch: ResponseBranch | FurtherBranch
-) -> dict[str, Dataset]:
+) -> Arrays:
     """Return results of structure and joints along a branch, over the frequency."""
-    along = "frequency of the force, in the order of the curve"
-    frequencies = {"frequency": Dataset(branch.frequencies, "Hz", along)}
+    frequencies = {"frequency": branch.frequencies}
     if case.engine_order is not None:
-        speed = case.turning * branch.frequencies
-        frequencies["speed"] = Dataset(speed, "rad/s", "of the engine, by its order")
-    return {**frequencies, **motion_datasets(model, branch.problem, branch.solutions)}
+        frequencies["speed"] = case.turning * branch.frequencies
+    return {**frequencies, **motion_columns(model, branch.problem, branch.solutions)}
 
 
-def _of_the_last(amplitudes: Dataset) -> Dataset:
-    """Return the main observed amplitude ``(n,)`` of all observed ones ``(n, k)``."""
-    last = amplitudes.values[:, -1]
-    return Dataset(last, "mm", "half of the way to and fro of what is looked at")
-
-
-def motion_datasets(
-    model: VibratingStructure, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
-) -> dict[str, Dataset]:
-    """Return results of structure and joints along a curve ``(n,)``, amplitudes ``(n, k)``."""
-    declared = declared_columns(model)
-    columns = motion_columns(model, problem, motions)
-    return {
-        name: Dataset(values, declared[name].unit, declared[name].description)
-        for name, values in columns.items()
-    }
-
-
-def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
+def _nodes(branch: ResponseBranch) -> Arrays:
     """Return results of each joint along the curve."""
     cycles = [motion.cycle for motion in branch.solutions]
     slip = np.array([(cycle.states == SLIP).mean(axis=0) for cycle in cycles])
     separated = np.array([(cycle.states == SEPARATED).mean(axis=0) for cycle in cycles])
     energy = np.array([cycle.dissipated for cycle in cycles])
-    share = "share of the cycle in which each joint"
-    return {
-        "slip": Dataset(slip, "1", f"{share} slips, by point of the curve"),
-        "separated": Dataset(separated, "1", f"{share} is apart"),
-        "energy": Dataset(energy, "N mm", "energy that each joint dissipates in a cycle"),
-    }
+    return {"slip": slip, "separated": separated, "energy": energy}
 
 
-def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
+def _cycle(solution: HarmonicSolution) -> Arrays:
     """Return displacements, forces and states of all joints in a cycle."""
     displacement = (solution.resolution.basis @ solution.coefficients).transpose(1, 0, 2)
     states = solution.cycle.states.astype(np.int8)
-    moved = "of each joint along x, y and its closing, at times of a cycle"
-    pulled = "of each joint along x, y and its pressure"
-    return {
-        "displacement": Dataset(displacement, "mm", moved),
-        "force": Dataset(solution.cycle.samples, "N", pulled),
-        "state": Dataset(states, "1", "of each joint: 0 sticks, 1 slips, 2 is apart"),
-    }
+    return {"displacement": displacement, "force": solution.cycle.samples, "state": states}
 
 
 def warn_of_stroke(

@@ -18,13 +18,18 @@ from workflow.analyses.vibration.further import further_from
 from workflow.analyses.vibration.model import (
     contact_at_rest,
     diameters,
-    linear_limits,
     structure_numbers,
     vibration_model,
 )
 from workflow.analyses.vibration.modes import mode_of, refuse_missing_modes
-from workflow.analyses.vibration.output.harmonics import CURVE, harmonics_along, names_of
-from workflow.analyses.vibration.output.outcome import Curves, Response, VibrationOutcome, trend
+from workflow.analyses.vibration.output.harmonics import harmonics_along, names_of
+from workflow.analyses.vibration.output.outcome import (
+    CURVE,
+    Curves,
+    Response,
+    VibrationOutcome,
+    trend,
+)
 from workflow.analyses.vibration.output.results import write_vibration_output
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.stability import looked_for
@@ -62,7 +67,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         _tell_what_is_left_out(case, model, reporter)
         by_diameters = diameters(model)
         refuse_missing_modes(case, model)
-        linear = steps("linear limits", lambda: linear_limits(model, case.frequencies))
+        linear = steps("linear limits", lambda: model.linear(case.frequencies))
     responses: list[Response] = []
     backbone = None
     sweeps: list[Curves] = []

@@ -16,9 +16,10 @@ from fe_models.dynamics.stability.floquet import Floquet, Stability
 from sa_solver.steps import Steps
 from sa_solver.types import Array
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
+from workflow.analyses.vibration.output.layout import bifurcation_columns
+from workflow.layout.declared import Arrays
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import Reporter
 
 # Values of the column of stability.
@@ -37,7 +38,7 @@ class CurveStability:
     ``numbers`` are for the summary. All are empty where stability is not computed.
     """
 
-    columns: Datasets
+    columns: Arrays
     numbers: dict[str, Any]
     bifurcations: tuple[dict[str, Any], ...]
 
@@ -117,29 +118,17 @@ def _stability_of(floquet: Floquet, motions: tuple[HarmonicSolution, ...]) -> tu
     return tuple(floquet.stability(motion) for motion in motions)
 
 
-def _columns(known: Sequence[Stability]) -> dict[str, Dataset]:
+def _columns(known: Sequence[Stability]) -> Arrays:
     """Return columns of motions; multipliers are left out where none is known."""
-    of = "of a small deviation in a period"
-    verdicts = np.array([CODES[at.verdict] for at in known])
-    columns = {"stability": Dataset(verdicts, "1", "1 stable, -1 unstable, 0 unknown")}
+    columns = {"stability": np.array([CODES[at.verdict] for at in known])}
     resolved = np.array([at.resolved for at in known], bool)
     if not resolved.any():
         return columns
     largest, error = np.array([(at.largest, at.error) for at in known]).T
-    unstable = np.array([at.unstable for at in known])
-    unknown = "NaN where it is not known"
     return columns | {
-        "multiplier": Dataset(
-            np.where(resolved, largest, np.nan),
-            "1",
-            f"size of the largest multiplier {of}, {unknown}",
-        ),
-        "multiplier_error": Dataset(
-            np.where(resolved, error, np.nan),
-            "1",
-            f"estimated, of the largest multiplier, {unknown}",
-        ),
-        "unstable_multipliers": Dataset(unstable, "1", f"multipliers {of} beyond 1, surely"),
+        "multiplier": np.where(resolved, largest, np.nan),
+        "multiplier_error": np.where(resolved, error, np.nan),
+        "unstable_multipliers": np.array([at.unstable for at in known]),
     }
 
 
@@ -160,26 +149,11 @@ def _described(
     }
 
 
-def columns_for(amount: ExcitationSize) -> dict[str, tuple[str, str]]:
-    """Return the columns of a bifurcation other than its kind: name, unit and description."""
-    return {
-        "frequency": ("Hz", "of the force"),
-        amount.name: (amount.unit, amount.description),
-        "amplitude": ("mm", "half of the way to and fro of what is looked at"),
-        "multiplier": ("1", "size of the one that passes the circle there"),
-        "multiplier_angle": ("rad", "its angle: 0 of a fold, pi where the period doubles"),
-        "unstable_before": ("1", "multipliers beyond the circle before, NaN where not known"),
-        "unstable_after": ("1", "and at the point after"),
-    }
-
-
-def bifurcation_datasets(
-    bifurcations: Sequence[Mapping[str, Any]], amount: ExcitationSize
-) -> dict[str, Dataset]:
+def bifurcation_arrays(bifurcations: Sequence[Mapping[str, Any]], amount: ExcitationSize) -> Arrays:
     """Return columns ``(n,)`` of bifurcations, without their kinds."""
     return {
-        name: Dataset(_numbers([found[name] for found in bifurcations]), unit, what)
-        for name, (unit, what) in columns_for(amount).items()
+        name: _numbers([found[name] for found in bifurcations])
+        for name in bifurcation_columns(amount)
     }
 
 

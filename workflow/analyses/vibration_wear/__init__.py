@@ -6,6 +6,8 @@ from workflow.analyses.vibration_wear.case import (
     ReducedWearCase,
     VibrationWearCase,
 )
+from workflow.analyses.vibration_wear.output.layout import layout_of
+from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents
 from workflow.analyses.vibration_wear.output.quantities import CURVES, main_results
 from workflow.analyses.vibration_wear.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
@@ -23,7 +25,6 @@ def _run(run: Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]) ->
 def _pictures() -> Pictures:
     # Imported here, as plotting takes a second to load.
     from workflow.analyses.vibration_wear.output.figures import figures_of
-    from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents
     from workflow.analyses.vibration_wear.output.paraview import write_vibration_wear
 
     return Pictures(figures_of, write_vibration_wear, contents=VibrationWearContents)
@@ -40,6 +41,7 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    layout=lambda case: layout_of(case.amount),
     quantities=main_results,
     curves=CURVES,
     resumable=True,

@@ -33,10 +33,7 @@ from workflow.analyses.vibration_wear.output.outcome import (
     SLIDERS,
     VibrationWearOutcome,
     WornRig,
-    depth_fields,
-    path_field,
     step_error,
-    wearing_loop,
 )
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
 from workflow.analyses.vibration_wear.vibrating_contact import ContactCycle, VibratingContact
@@ -44,9 +41,9 @@ from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
 from workflow.analyses.wear.translation import wear_of
 from workflow.case.loading import load_case
 from workflow.case.text.plain import counted
+from workflow.layout.declared import Arrays
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.few_cells import check_cells
-from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
 # Share of the motion of full slip, at which loops in partial slip are compared.
@@ -168,43 +165,37 @@ def _energy_error(cycle: ContactCycle, loop: TangentialLoop) -> float:
     return (by_sliders - loop.energy) / larger if larger > 0.0 else 0.0
 
 
-def _fields(cycle: ContactCycle, loop: TangentialLoop) -> dict[str, dict[str, Dataset]]:
+def _fields(cycle: ContactCycle, loop: TangentialLoop) -> dict[str, Arrays]:
     displacement, force = loop.cycle
-    pull = "between them, of the whole tangential problem"
+    moved, pulled = cycle.displacement, cycle.motion.cycle.samples[:, 0, 0]
     return {
         CONTACT: _contact_fields(cycle),
-        SLIDERS: _slider_fields(cycle),
-        LOOP: wearing_loop(closed(cycle.displacement), closed(cycle.motion.cycle.samples[:, 0, 0])),
-        HALF_SPACE: {
-            "displacement": Dataset(displacement, "mm", "of the bodies, as far to and fro"),
-            "force": Dataset(force, "N", pull),
-        },
+        SLIDERS: _sliders(cycle),
+        LOOP: {"displacement": closed(moved), "force": closed(pulled)},
+        HALF_SPACE: {"displacement": displacement, "force": force},
     }
 
 
-def _contact_fields(cycle: ContactCycle) -> dict[str, Dataset]:
+def _contact_fields(cycle: ContactCycle) -> Arrays:
     """Return fields of the grid."""
     normal, surfaces = cycle.slipping.normal, cycle.state.surfaces
-    gap = np.maximum(normal.gap, 0.0) * (normal.pressure == 0.0)
-    sticks = "motion of the joint from rest up to which each cell sticks"
     return {
-        "pressure": Dataset(normal.pressure, "MPa", "at rest"),
-        "gap": Dataset(gap, "mm", "at rest"),
-        **depth_fields(surfaces.depth_1, surfaces.depth_2),
-        "onset": Dataset(cycle.friction * cycle.slipping.onset, "mm", sticks),
-        "path": path_field(cycle.path),
-        "energy": Dataset(cycle.energy, "N/mm", "per area, in such a cycle"),
+        "pressure": normal.pressure,
+        "gap": np.maximum(normal.gap, 0.0) * (normal.pressure == 0.0),
+        "depth_1": surfaces.depth_1,
+        "depth_2": surfaces.depth_2,
+        "onset": cycle.friction * cycle.slipping.onset,
+        "path": cycle.path,
+        "energy": cycle.energy,
     }
 
 
-def _slider_fields(cycle: ContactCycle) -> dict[str, Dataset]:
+def _sliders(cycle: ContactCycle) -> Arrays:
     """Return the sliders that represent the contact in the rig, ``(n,)`` each."""
     slipping = cycle.slipping
-    reach = cycle.friction * slipping.reach
-    lost = "that it dissipates in a cycle under the force that wears"
     return {
-        "reach": Dataset(reach, "mm", "motion at which each slider gives way"),
-        "stiffness": Dataset(slipping.slider_stiffness, "N/mm", "of its spring"),
-        "normal_load": Dataset(slipping.slider_load, "N", "that presses it"),
-        "energy": Dataset(cycle.by_slider, "N mm", lost),
+        "reach": cycle.friction * slipping.reach,
+        "stiffness": slipping.slider_stiffness,
+        "normal_load": slipping.slider_load,
+        "energy": cycle.by_slider,
     }

@@ -36,18 +36,15 @@ from workflow.analyses.vibration_wear.output.outcome import (
     VibrationWearOutcome,
     WornNodes,
     WornRig,
-    depth_fields,
-    path_field,
     step_error,
-    wearing_loop,
 )
 from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
 from workflow.case.loading import load_case
 from workflow.case.text.plain import counted
+from workflow.layout.declared import Arrays
 from workflow.models.rig.rig_model import RigModel
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -111,20 +108,15 @@ def resonance_that_wears(case: NodesWearCase, problem: HarmonicBalance) -> Harmo
 
 def _nodes(rig: RigModel) -> WornNodes:
     """Return the places of the contacts, as far as they are known."""
-    area = {"area": Dataset(rig.area, "mm^2", "that belongs to each node")}
-    nodes = rig.nodes
+    nodes, on_plane = rig.nodes, {axis: rig.places[:, k] for k, axis in enumerate("xy")}
     if nodes is None:
-        return WornNodes(_on_plane(rig, "of each node on the contact plane") | area)
-    bodies = {"normal": Dataset(nodes.normals, "1", "out of body 1, what the joints' points meet")}
+        return WornNodes({**on_plane, "area": rig.area})
+    bodies = {"normal": nodes.normals}
     if nodes.places is not None:
-        bodies[POSITION] = Dataset(nodes.places, "mm", "of each node, x, y, z")
+        bodies[POSITION] = nodes.places
         if len(rig.places):
-            bodies |= _on_plane(rig, "of each node across the normal, from the middle of all")
-    return WornNodes(bodies | area, nodes.names)
-
-
-def _on_plane(rig: RigModel, what: str) -> dict[str, Dataset]:
-    return {axis: Dataset(rig.places[:, k], "mm", what) for k, axis in enumerate("xy")}
+            bodies |= on_plane
+    return WornNodes(bodies | {"area": rig.area}, nodes.names)
 
 
 def _worn_state(
@@ -171,16 +163,16 @@ def _worn_state(
     return WornRig(cycles, numbers, _fields(cycle, state, loop), responses)
 
 
-def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, dict[str, Dataset]]:
-    gap, pressed = cycle.model.rig.gap, cycle.model.rest.cycle.samples[0, :, 2]
-    moved, pulled = (loop.datasets[name].values for name in ("displacement", "force"))
+def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, Arrays]:
+    depth_1, depth_2 = state.surfaces.depths
     return {
         NODES: {
-            "gap": Dataset(gap, "mm", "of the worn bodies without load; below 0 what it closes"),
-            **depth_fields(*state.surfaces.depths),
-            "normal_force": Dataset(pressed, "N", "of each node at rest"),
-            "path": path_field(cycle.path),
-            "energy": Dataset(cycle.energy, "N mm", "that each node dissipates in such a cycle"),
+            "gap": cycle.model.rig.gap,
+            "depth_1": depth_1,
+            "depth_2": depth_2,
+            "normal_force": cycle.model.rest.cycle.samples[0, :, 2],
+            "path": cycle.path,
+            "energy": cycle.energy,
         },
-        LOOP: wearing_loop(moved, pulled),
+        LOOP: {name: loop.arrays[name] for name in ("displacement", "force")},
     }

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.output.layout import LAYOUT, WearContents
 from workflow.analyses.wear.output.measures import COMPARISON
 from workflow.analyses.wear.output.quantities import CURVES, main_results
 from workflow.analyses.wear.run_time import run_time
@@ -37,7 +38,6 @@ def _draw_faces(case: WearCase, name: str, out: Path, force: bool) -> Path:
 def _pictures() -> Pictures:
     # Plots take a second to import, so they are imported only where they are drawn.
     from workflow.analyses.wear.figures.wear import figures_of
-    from workflow.analyses.wear.output.layout import WearContents
     from workflow.analyses.wear.paraview.wear import write_wear
 
     return Pictures(figures_of, write_wear, contents=WearContents)
@@ -51,6 +51,7 @@ ANALYSIS = Analysis(
     beside="pictures",  # ten seconds and more on one core
     memory=lambda case: structure_of(case).memory(case, 0, 0),
     run_time=lambda case: run_time(case, structure_of(case).extent(case)),
+    layout=lambda case: LAYOUT,
     quantities=main_results,
     curves=CURVES,
     resumable=True,

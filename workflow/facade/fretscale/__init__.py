@@ -27,7 +27,6 @@ Results
     - ``Results``: the summary, warnings and case of a run, and everything that it computed.
     - ``MainResult``: a main result of a run, with unit and estimated error.
     - ``Group``: datasets and groups of ``results.h5`` under one name.
-    - ``Values``: a dataset, read on demand, with its unit and description.
 
 Comparison of runs
     - ``compare``: compare finished runs.
@@ -127,7 +126,7 @@ if TYPE_CHECKING:
     )
     from workflow.interface.cases import Check, check, load_case
     from workflow.interface.comparing import ComparedResult, Comparison, compare
-    from workflow.interface.datasets import Group, Values
+    from workflow.interface.datasets import Group
     from workflow.interface.fitting import FitResult, FittedParameter, fit
     from workflow.interface.modelling import vibration_model, wear_model
     from workflow.interface.observers import Checkpoint, Progress
@@ -181,7 +180,6 @@ __all__ = [
     "TightenedBolt",
     "UncoupledSource",
     "UserError",
-    "Values",
     "VibrationModel",
     "Wear",
     "WearModel",
@@ -218,7 +216,7 @@ __getattr__, __dir__ = lazy_names(
         ),
         "workflow.interface.cases": ("Check", "check", "load_case"),
         "workflow.interface.comparing": ("ComparedResult", "Comparison", "compare"),
-        "workflow.interface.datasets": ("Group", "Values"),
+        "workflow.interface.datasets": ("Group",),
         "workflow.interface.fitting": ("FitResult", "FittedParameter", "fit"),
         "workflow.interface.results": ("MainResult", "Results", "open"),
         "workflow.interface.running": ("run",),

@@ -17,7 +17,7 @@ from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.coupled import Observer
 from workflow.errors import MethodFailed, ModelWarning
-from workflow.models.results import Declared
+from workflow.layout.declared import over
 from workflow.models.rig.laws import Laws
 from workflow.models.rig.rig_model import RigModel
 
@@ -26,17 +26,20 @@ if TYPE_CHECKING:
 
 # Error by time steps, as a share of the largest displacement, from which a warning is given.
 LARGEST_ERROR = 0.05
-TIME = ("time",)
 CURVES = {
-    "excitation": Declared("N", "force of the excitation", TIME),
-    "displacement": Declared("mm", "displacements of what is seen", (*TIME, "place")),
-    "acceleration": Declared("mm/s^2", "accelerations of what is seen", (*TIME, "place")),
-    "joint_force": Declared("N", "force of the joint, or the sum of several, resisting", TIME),
-    "dissipated": Declared(
-        "N mm", "energy that the joint has dissipated since the beginning", TIME
+    **over(
+        "time",
+        time=("s", "time"),
+        excitation=("N", "force of the excitation"),
+        joint_force=("N", "force of the joint, or the sum of several, resisting"),
+        dissipated=("N mm", "energy that the joint has dissipated since the beginning"),
+    ),
+    **over(
+        "time place",
+        displacement=("mm", "displacements of what is seen"),
+        acceleration=("mm/s^2", "accelerations of what is seen"),
     ),
 }
-CLOCK = Declared("s", "time", TIME)
 
 
 @dataclass(frozen=True)
@@ -148,8 +151,8 @@ class MotionModel:
             )
         curves = curves_of(self.rig, self.force, motion)
         return xr.Dataset(
-            {name: declared.variable(curves[name]) for name, declared in CURVES.items()},
-            coords={"time": CLOCK.variable(curves["time"]), "place": list(self.rig.labels)},
+            {name: CURVES[name].variable(values) for name, values in curves.items()},
+            coords={"place": list(self.rig.labels)},
             attrs={
                 "step_error": motion.error,
                 "balance_error": motion.energies.balance_error,

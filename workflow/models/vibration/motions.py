@@ -15,7 +15,7 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.resolution_error import resolution_error
 from sa_solver.types import Array
 from wear.joints.periodic.march import SEPARATED, SLIP
-from workflow.models.results import Declared
+from workflow.layout.declared import over
 from workflow.models.vibration.structure import VibratingStructure
 
 # Times of a period from which amplitudes are taken. The true amplitude of harmonic 1 is at most
@@ -24,31 +24,28 @@ TIMES = 1024
 # Tolerance on the frequency of the largest amplitude, relative to it.
 RESONANCE_TOLERANCE = 1e-6
 
-POINT = ("point",)
-OBSERVED = (*POINT, "place")
 SEEN = "half of the way to and fro of what is seen, the last looked at"
+SLIPS = "share of the cycle in which a joint slips, mean of those that touch at rest"
 COLUMNS = {
-    "amplitude": Declared("mm", SEEN, OBSERVED),
-    "absolute_amplitude": Declared("mm", f"{SEEN}, that of the ground included", OBSERVED),
-    "phase": Declared(
-        "rad",
-        "of harmonic 1 of what is looked at before the force, or before a sine at t = 0",
-        POINT,
+    **over(
+        "point place",
+        amplitude=("mm", f"{SEEN}; relative to the ground if it moves"),
+        absolute_amplitude=("mm", f"{SEEN}, that of the ground included"),
     ),
-    "energy_per_cycle": Declared("N mm", "energy that the joints dissipate in a cycle", POINT),
-    "damping": Declared(
-        "1", "energy lost in a cycle over 4π times the largest kinetic energy", POINT
-    ),
-    "slip": Declared(
-        "1", "share of the cycle in which a joint slips, mean of those that touch at rest", POINT
-    ),
-    "separated": Declared("1", "share of the cycle in which they are apart", POINT),
-    "left_out": Declared(
-        "1", "estimated share of the joints' vibration in harmonics left out", POINT
+    **over(
+        "point",
+        phase=(
+            "rad",
+            "of harmonic 1 of what is looked at before the force, or before a sine at t = 0",
+        ),
+        energy_per_cycle=("N mm", "energy that the joints dissipate in a cycle"),
+        damping=("1", "energy lost in a cycle over 4π times the largest kinetic energy"),
+        slip=("1", SLIPS),
+        separated=("1", "share of the cycle in which they are apart"),
+        left_out=("1", "estimated share of the joints' vibration in harmonics left out"),
     ),
 }
 """Columns of the motions along a curve; absolute amplitudes only where the ground moves."""
-RELATIVE = COLUMNS["amplitude"]._replace(description=f"{SEEN}, relative to the moving ground")
 
 
 def motion_columns(
@@ -56,7 +53,7 @@ def motion_columns(
 ) -> dict[str, Array]:
     """Return the values of motions along a curve: ``(n,)`` each, amplitudes ``(n, k)``.
 
-    Their units and descriptions are in :func:`declared_columns`.
+    :data:`COLUMNS` describes them.
     """
 
     def column(of: Callable[[HarmonicSolution], Array | float]) -> Array:
@@ -76,13 +73,6 @@ def motion_columns(
         "separated": column(lambda motion: structure.time_share(motion, SEPARATED)),
         "left_out": column(lambda motion: motion.left_out),
     }
-
-
-def declared_columns(structure: VibratingStructure) -> dict[str, Declared]:
-    """Return unit, description and dimensions of :func:`motion_columns`, by name."""
-    if structure.driving.ground:
-        return COLUMNS | {"amplitude": RELATIVE}
-    return {name: column for name, column in COLUMNS.items() if name != "absolute_amplitude"}
 
 
 def _phase(solution: HarmonicSolution, seen: Array) -> float:

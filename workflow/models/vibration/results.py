@@ -12,8 +12,9 @@ from fe_models.dynamics.curves.forced_response import ResponseBranch
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
-from workflow.models.results import Declared
-from workflow.models.vibration.motions import POINT, amplitudes_of, declared_columns
+from workflow.layout.declared import Declared, over
+from workflow.models.vibration.amount import FORCE, ExcitationSize
+from workflow.models.vibration.motions import COLUMNS, amplitudes_of
 from workflow.models.vibration.structure import VibratingStructure
 
 if TYPE_CHECKING:
@@ -21,8 +22,20 @@ if TYPE_CHECKING:
 
 # Error of a motion, due to harmonics and samples, that gives a warning.
 LARGEST_ERROR = 0.05
-FREQUENCY = Declared("Hz", "frequency of the force, in the order of the curve", POINT)
-LIMITS = ("frequency",)
+FREQUENCY = Declared("Hz", "frequency of the force, in the order of the curve", ("point",))
+
+
+def linear_limits(amount: ExcitationSize) -> dict[str, Declared]:
+    """Return the declaration of the linear limits under an amount: a force or a level."""
+    unit, _ = amount.receptance
+    first = "" if amount is FORCE else ", of harmonic 1"
+    size = f"amplitude of what is looked at over the {amount.name}{first}"
+    return over(
+        "frequency",
+        frequency=("Hz", "frequency of the force"),
+        free=(unit, f"{size}, without the joints"),
+        stuck=(unit, f"{size}, all joints stuck"),
+    )
 
 
 @dataclass(frozen=True)
@@ -81,26 +94,17 @@ class VibrationResults:
         import xarray as xr
 
         limits, amount = self.structure.linear(self.frequencies), self.structure.driving.amount
-        size = f"amplitude of what is looked at over the {amount.name}"
-        unit, _ = amount.receptance
-        values = {
-            "free": (Declared(unit, f"{size}, without the joints", LIMITS), limits.free),
-            "stuck": (Declared(unit, f"{size}, all joints stuck", LIMITS), limits.stuck),
-        }
-        along = Declared("Hz", "frequency of the force", LIMITS).variable(limits.frequency)
-        return xr.Dataset(
-            {name: declared.variable(array) for name, (declared, array) in values.items()},
-            coords={"frequency": along},
-        )
+        declared = linear_limits(amount)
+        variables = {name: declared[name].variable(array) for name, array in limits.items()}
+        return xr.Dataset(variables).set_coords("frequency")
 
     def _response(self, response: ForcedResponse) -> xr.Dataset:
         import xarray as xr
 
-        declared, resonance = declared_columns(self.structure), response.resonance
-        branch = response.branch
+        branch, resonance = response.branch, response.resonance
         problem = branch.problem.refined(resonance.resolution)
         return xr.Dataset(
-            {name: declared[name].variable(array) for name, array in response.columns.items()},
+            {name: COLUMNS[name].variable(array) for name, array in response.columns.items()},
             coords={
                 "frequency": FREQUENCY.variable(branch.frequencies),
                 "place": list(self.structure.rig.labels),

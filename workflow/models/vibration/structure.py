@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as sl
@@ -32,14 +31,6 @@ BESIDE = 1e-5
 AT_ONCE = 20
 # Joints for which a further thread pays off, and most threads.
 JOINTS_PER_THREAD, MOST_THREADS = 16, 8
-
-
-class LinearLimits(NamedTuple):
-    """Amplitudes over force or level ``(f,)`` at frequencies [Hz], with joints free and stuck."""
-
-    frequency: Array
-    free: Array
-    stuck: Array
 
 
 @dataclass(frozen=True)
@@ -128,11 +119,12 @@ class VibratingStructure:
         """Lowest natural frequencies [Hz] with the joints free, stuck and sliding."""
         return {"free": self.rig.free(), **self.rig.modes(self.law, self.resting)}
 
-    def linear(self, span: tuple[float, float]) -> LinearLimits:
+    def linear(self, span: tuple[float, float]) -> dict[str, Array]:
         """Return the linear limits of the main observed amplitude over a span of frequencies.
 
-        Both are for harmonic 1. The natural frequencies are among the points; without damping,
-        where the amplitude has no bound there, points close to them are used.
+        These are ``frequency`` ``(f,)`` [Hz], and the amplitudes over force or level with joints
+        ``free`` and ``stuck``, for harmonic 1. The natural frequencies are among the points;
+        without damping, where the amplitude has no bound there, points close to them are used.
         """
         natural = np.array([*self.natural["free"], *self.natural["stuck"]])
         if self.undamped:
@@ -143,7 +135,7 @@ class VibratingStructure:
         frequency = np.union1d(np.geomspace(*span, points), inside)
         parts = np.array_split(frequency, -(-len(frequency) // AT_ONCE))
         free, stuck = np.concatenate([self._limits(part) for part in parts], axis=1)
-        return LinearLimits(frequency, free, stuck)
+        return {"frequency": frequency, "free": free, "stuck": stuck}
 
     def _limits(self, frequency: Array) -> Array:
         """Return amplitudes over force ``(2, f)`` [mm/N], with joints free and stuck."""

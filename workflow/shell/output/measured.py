@@ -26,8 +26,8 @@ from workflow.case.files.table_file import TableFile, check_unit, read_table_fil
 from workflow.case.sections import Case, Measured
 from workflow.case.text.readable import everyday_unit, percent, readable
 from workflow.errors import UserError
+from workflow.layout.declared import Layout
 from workflow.shell.output.curves import Curve, curves_in
-from workflow.shell.output.dataset import unit_in
 from workflow.shell.output.quantities import CurvesOf
 
 # Ending of the heading of a column of standard deviations, as in `fretscale fit`.
@@ -73,10 +73,11 @@ class MeasuredCurve:
         return np.isfinite(self.computed)
 
 
-def check_measured(case: Case, curves: Sequence[CurvesOf]) -> None:
+def check_measured(case: Case, curves: Sequence[CurvesOf], layout: Layout) -> None:
     """Raise UserError, before the run begins, for points that no run could be compared with.
 
-    Checks that need the results, such as which of the curves exist, are left to :func:`beside`.
+    ``layout`` has the units of the curves. Checks that need the results, such as which of the
+    curves exist, are left to :func:`beside`.
     """
     for number, entry in enumerate(case.measured):
         meant = [wanted for wanted in curves if _begins(entry.curve, wanted.title)]
@@ -85,20 +86,17 @@ def check_measured(case: Case, curves: Sequence[CurvesOf]) -> None:
             raise UserError(
                 f"measured.{number}.curve: {shown(entry.curve)}: no such curve; allowed: {known}"
             )
-        refusals = [_refusal(entry, *units) for wanted in meant for units in _units_of(wanted)]
+        refusals = [
+            _refusal(entry, layout.unit(wanted.x, line), layout.unit(wanted.y, line))
+            for wanted in meant
+            for line in (False, True)
+        ]
         if all(refusals):
             raise UserError(f"measured.{number}: {refusals[0]}")
 
 
-def _units_of(curves: CurvesOf) -> Iterator[tuple[str, str]]:
-    """Yield the units of the curves for contacts over an area and for line contacts."""
-    for line in (False, True):
-        x, y = (unit_in(line, unit) for unit in curves.units)
-        yield x, y
-
-
 def _refusal(entry: Measured, x_unit: str, y_unit: str) -> str:
-    """Return why the points cannot be read in these units ("" for any unit); empty if they can."""
+    """Return why the points cannot be read in these units; empty if they can."""
     try:
         read_points(entry, x_unit, y_unit)
     except UserError as error:

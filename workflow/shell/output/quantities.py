@@ -42,12 +42,10 @@ class CurvesOf:
     In the paths, ``*`` stands for any group and ``-1`` for the last numbered one; the groups found
     in ``y`` are inserted in ``x`` too. The last column of a dataset with several columns is used.
     If ``x`` is a grid, ``y`` is a field over it (the first component of a vector), and the curve
-    runs along x through the middle. ``units`` are the base units of x and y in a contact over an
-    area ("1" for none, "" where the case decides). ``logarithmic`` refers to the y axis.
+    runs along x through the middle. ``logarithmic`` refers to the y axis.
     """
 
     title: str
     x: str
     y: str
-    units: tuple[str, str]
     logarithmic: bool = False

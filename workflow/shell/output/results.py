@@ -1,10 +1,9 @@
-"""The layout of ``results.h5``: groups of datasets, each with its unit and description."""
+"""Writing of ``results.h5`` as the layout of an analysis declares it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +15,10 @@ from sa_solver.types import Frame, Grid
 from workflow.case.sections import Case
 from workflow.case.text.writing import dump_case
 from workflow.errors import UserError
+from workflow.layout.declared import Arrays, Layout
 from workflow.shell.analysis import Run
 from workflow.shell.folders.store import replacing_hdf5
 from workflow.shell.folders.versions import versions
-from workflow.shell.output.dataset import Dataset, Datasets, unit_in
 
 # Datasets with more values than this are compressed.
 LARGE = 4096
@@ -28,78 +27,79 @@ CONTENTS = "contents"
 # The shuffle filter stores bytes of equal significance together: it saves a sixth of the space and
 # a quarter of the time.
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-# Attribute of a dataset: the group with the coordinates along its axes, if it is another group.
-COORDINATES = "coordinates"
-# The last axes of a field on a grid.
-CELLS = "x", "y"
-
-
-@dataclass(frozen=True)
-class CurveAxis:
-    """Marks datasets as curves over the dataset of this name, in the same group or given by a path.
-
-    It applies to the datasets that have the same length.
-    """
-
-    name: str
-
-
-@dataclass(frozen=True)
-class On:
-    """Marks datasets as fields on the cells of the ``grid``, a group that ``put_grid`` has written.
-
-    It applies to the datasets whose last two axes have the shape of the grid.
-    """
-
-    grid: str
+# Group of the dimensions that have no coordinate, by length, and how netCDF marks them.
+DIMENSIONS = "dimensions"
+NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable."
 
 
 class ResultsWriter:
-    """Writer of datasets to an HDF5 file; ``line`` contacts have forces and energies per mm."""
+    """Writer of declared datasets to an HDF5 file; ``line`` contacts have forces per mm.
 
-    def __init__(self, file: h5py.File, line: bool = False) -> None:
-        self._file, self._line = file, line
+    Axes are HDF5 dimension scales, so that xarray opens the file as it is. A coordinate of another
+    group stands in a group as a soft link.
+    """
 
-    def put(
-        self,
-        group: str,
-        datasets: Datasets,
-        over: CurveAxis | On | None = None,
-        /,
-        **attributes: Any,
-    ) -> None:
-        """Write datasets to a new or existing group; attributes that are None are left out.
+    def __init__(self, file: h5py.File, layout: Layout, line: bool = False) -> None:
+        self._file, self._layout, self._line = file, layout, line
 
-        The axes that datasets are ``over`` are stored as HDF5 axis labels, which name datasets of
-        the same group, or of the group in the attribute ``coordinates``.
+    def put(self, group: str, arrays: Arrays, /, **attributes: Any) -> None:
+        """Write arrays to a new or existing group; attributes that are None are left out.
+
+        Raises KeyError for an array that the layout does not declare, and ValueError for one of
+        other dimensions.
         """
         place = self._file.require_group(group)
-        for name, dataset in datasets.items():
-            packed = PACKED if np.size(dataset.values) > LARGE else {}
-            written = place.create_dataset(name, data=dataset.values, **packed)
-            written.attrs["unit"] = unit_in(self._line, dataset.unit)
-            written.attrs["description"] = dataset.description
+        declared = self._layout.datasets(group) if arrays else {}
+        for name, values in arrays.items():
+            packed = PACKED if np.size(values) > LARGE else {}
+            written = place.create_dataset(name, data=values, **packed)
+            unit, description = declared[name].unit_in(self._line), declared[name].description
+            # The latter two are what xarray and netCDF call them.
+            written.attrs.update(
+                unit=unit, description=description, units=unit, long_name=description
+            )
+            if declared[name].dims == (name,):
+                written.make_scale(name)
         place.attrs.update({name: value for name, value in attributes.items() if value is not None})
-        made = [place[name] for name in datasets]
-        if isinstance(over, On):
-            self._label_fields(made, over.grid)
-        elif isinstance(over, CurveAxis):
-            self._label_curves(made, place, over.name)
+        for name in arrays:
+            if declared[name].dims != (name,):
+                self._label(place, name, declared[name].dims)
 
-    def _label_fields(self, made: Sequence[h5py.Dataset], grid: str) -> None:
-        shape = tuple(self._file[grid].attrs["shape"])
-        for dataset in made:
-            if dataset.shape[-2:] == shape:
-                dataset.dims[dataset.ndim - 2].label, dataset.dims[dataset.ndim - 1].label = CELLS
-                dataset.attrs[COORDINATES] = grid
+    def _label(self, place: h5py.Group, name: str, dims: tuple[str, ...]) -> None:
+        """Attach the scales of its dimensions to a dataset."""
+        dataset = place[name]
+        if len(dims) != dataset.ndim:
+            raise ValueError(f"{dataset.name}: declared over {dims}, but has {dataset.ndim} axes")
+        scales = np.empty(len(dims), dtype=object)
+        for axis, (dim, length) in enumerate(zip(dims, dataset.shape, strict=True)):
+            scales[axis] = np.array([self._scale(place, dim, length).ref], dtype=h5py.ref_dtype)
+        # h5py's attach_scale lists all datasets in an attribute of the scale too, which is slow
+        # and limited to 64 kB.
+        references = h5py.vlen_dtype(h5py.ref_dtype)
+        dataset.attrs.create("DIMENSION_LIST", scales, dtype=references)
 
-    def _label_curves(self, made: Sequence[h5py.Dataset], place: h5py.Group, along: str) -> None:
-        elsewhere, _, name = along.rpartition("/")
-        length = (self._file[elsewhere] if elsewhere else place)[name].shape
-        for dataset in made:
-            if dataset.shape[:1] == length:
-                dataset.dims[0].label = name
-                dataset.attrs.update({COORDINATES: elsewhere} if elsewhere else {})
+    def _scale(self, place: h5py.Group, dim: str, length: int) -> h5py.Dataset:
+        """Return the scale of a dimension; a link to it is made where it is in another group."""
+        if dim not in place:
+            place[dim] = h5py.SoftLink(self._coordinate(place.name.strip("/"), dim, length))
+        if not place[dim].is_scale or len(place[dim]) != length:
+            raise ValueError(f"{place.name}: {dim} is no coordinate of {length} values")
+        return place[dim]
+
+    def _coordinate(self, group: str, dim: str, length: int) -> str:
+        """Return the path of a coordinate, or of a dimension of this length without one."""
+        parts = group.split("/")
+        above = ["/".join([*parts[:count], dim]) for count in range(len(parts) - 1, 0, -1)]
+        for path in (*above, *self._layout.coordinates_of(group, dim)):
+            found = self._file.get(path)
+            if found is not None and found.is_scale and len(found) == length:
+                return f"/{path}"
+        path = f"{DIMENSIONS}/{length}/{dim}"
+        if path not in self._file:
+            scale = self._file.create_dataset(path, shape=(length,), dtype=">f4")
+            scale.make_scale(f"{NO_COORDINATE}{length:10d}")
+            scale.attrs.update(unit="1", description="dimension without a coordinate")
+        return f"/{path}"
 
     def put_contents(self, contents: Any) -> None:
         """Write the description of the file's contents, for the functions that draw it."""
@@ -110,27 +110,24 @@ class ResultsWriter:
         """Write a grid, the centres of its cells and, if known, its position in space."""
         line = {"line": True} if grid.line else {}
         placed = {} if frame is None else {"origin": frame.origin, "axes": frame.axes}
-        centres = {
-            "x": Dataset(grid.x[:, 0], "mm", "centres of the cells along x"),
-            "y": Dataset(grid.y[0], "mm", "centres of the cells along y"),
-        }
+        centres = {"x": grid.x[:, 0], "y": grid.y[0]}
         self.put(group, centres, shape=grid.shape, pitch=grid.pitch, **line, **placed)
 
 
 @contextmanager
-def writing(path: Path, line: bool = False) -> Iterator[ResultsWriter]:
+def writing(path: Path, layout: Layout, line: bool = False) -> Iterator[ResultsWriter]:
     """Write an HDF5 file, which appears under its name once it is complete."""
     with replacing_hdf5(path) as stream, h5py.File(stream, "w") as file:
-        yield ResultsWriter(file, line)
+        yield ResultsWriter(file, layout, line)
 
 
 @contextmanager
 def run_results(
-    run: Run[Any], case: Case, attributes: Mapping[str, Any], line: bool = False
+    run: Run[Any], case: Case, layout: Layout, attributes: Mapping[str, Any], line: bool = False
 ) -> Iterator[ResultsWriter]:
     """Write ``results.h5`` of a run: its kind and title, the ``case`` as run, and its datasets."""
     path = run.folder.reserve("results.h5", "fields and curves, with units and descriptions")
-    with writing(path, line) as writer:
+    with writing(path, layout, line) as writer:
         writer.put("/", {}, kind=run.kind, title=case.title, **attributes)
         writer.put("case", {}, text=dump_case(case), **versions())
         yield writer
@@ -160,3 +157,8 @@ def grid_of(group: h5py.Group) -> Grid:
 def frame_of(group: h5py.Group) -> Frame:
     """Return the frame that a group's attributes describe."""
     return Frame(np.array(group.attrs["origin"]), np.array(group.attrs["axes"]))
+
+
+def own(group: h5py.Group) -> list[str]:
+    """Return the names in a group but for links to coordinates and dimensions elsewhere."""
+    return [name for name in group if not isinstance(group.get(name, getlink=True), h5py.SoftLink)]

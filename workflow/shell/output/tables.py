@@ -13,22 +13,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from workflow.layout.declared import Arrays, Declarations
 from workflow.shell.folders.store import replacing
-from workflow.shell.output.dataset import Datasets
 
 # Digits of curves: more than their accuracy, fewer than an exact copy needs.
 DIGITS = 9
 
 
-def write_curves(path: Path, curves: Datasets) -> None:
-    """Write datasets as columns; several values at a point become several columns."""
+def write_curves(path: Path, curves: Arrays, declared: Declarations) -> None:
+    """Write curves as columns; several values at a point become several columns."""
     columns: dict[str, NDArray[Any]] = {}
-    for name, dataset in curves.items():
-        if dataset.values.ndim == 1:
-            columns[heading(name, dataset.unit)] = dataset.values
+    for name, values in curves.items():
+        unit = declared[name].unit
+        if values.ndim == 1:
+            columns[heading(name, unit)] = values
         else:
-            for number, values in enumerate(dataset.values.T, start=1):
-                columns[heading(f"{name}_{number}", dataset.unit)] = values
+            for number, column in enumerate(values.T, start=1):
+                columns[heading(f"{name}_{number}", unit)] = column
     write_table(path, columns, DIGITS)
 
 

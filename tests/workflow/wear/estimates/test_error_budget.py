@@ -20,7 +20,12 @@ from workflow.analyses.wear.approximations.probe_runs import STEPS, Numbers, pro
 from workflow.analyses.wear.budget import finding, probe_cases
 from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_lowered
 from workflow.analyses.wear.budget.probe_cases import ProbeCases, late, scaled
-from workflow.analyses.wear.budget.report import datasets_of, sentences, summary_of, warning_of
+from workflow.analyses.wear.budget.report import (
+    arrays_of,
+    sentences,
+    summary_of,
+    warning_of,
+)
 from workflow.analyses.wear.checks import run_errors
 from workflow.analyses.wear.checks.run_errors import REMEDIES
 from workflow.analyses.wear.fidelity.choosing import SHARES
@@ -78,7 +83,7 @@ def test_parts_add_up_and_unknown_ones_are_named() -> None:
         "estimated errors: depth 4.6%",
         "most of depth: mesh 3.0%, steps 1.2%; unknown: increments",
     ]
-    (written,) = (data.values for data in datasets_of({"depth": ERROR}).values())
+    (written,) = arrays_of({"depth": ERROR}).values()
     *by_part, total = written
     known = {part: value for part, value in zip(PARTS, by_part, strict=True) if value == value}
     left = {"link": 0.004, "mesh": 0.03, "steps": 0.012}

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
-from workflow.analyses.contact.output.datasets import BODIES, ContactContents
+from workflow.analyses.contact.output.layout import BODIES, ContactContents
 from workflow.pictures.fields import (
     FLAT,
     MARGIN,
@@ -31,7 +31,7 @@ from workflow.pictures.fields import (
 from workflow.pictures.panels import Figures, legend_below, new_figure, shaded, spread
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE
-from workflow.shell.output.results import grid_of
+from workflow.shell.output.results import grid_of, own
 
 # One style per profile, as those of a closed cycle coincide.
 DASHES = ("-", "--", "-.", ":", (0, (8, 2)), (0, (1, 3)))
@@ -95,7 +95,7 @@ def _shown(file: h5py.File) -> list[str]:
     """Return names of the states to show: the turning points of the path, evenly chosen if many."""
     names = list(file["contact"][BODIES])
     rows = file["history/increment"][()] - 1
-    path = np.stack([column[()][rows] for column in file["path"].values()], axis=1)
+    path = np.stack([file["path"][name][()][rows] for name in own(file["path"])], axis=1)
     steps = np.sign(np.diff(path, axis=0))
     turns = [
         name for name, (a, b) in zip(names[1:], pairwise(steps), strict=False) if (a != b).any()

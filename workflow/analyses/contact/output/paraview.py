@@ -11,7 +11,7 @@ from pathlib import Path
 
 import h5py
 
-from workflow.analyses.contact.output.datasets import BODIES, ContactContents
+from workflow.analyses.contact.output.layout import BODIES, ContactContents
 from workflow.pictures.view import FIRST, PictureScene, Shown, View, write_view
 from workflow.pictures.vtk import (
     INCREMENTS,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from workflow.analyses.contact.case import BodiesCase
-from workflow.analyses.contact.output.datasets import LOADS, RIGID_MOTIONS
+from workflow.analyses.contact.output.layout import LAYOUT
+from workflow.layout.declared import unit_in
 from workflow.shell.analysis import Summary
-from workflow.shell.output.dataset import unit_in
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, told
 
@@ -40,23 +40,21 @@ CURVES = (
         "pressure along x in the middle, last increment",
         "grid/bodies",
         "contact/bodies/-1/pressure",
-        ("mm", "MPa"),
     ),
     CurvesOf(
         "shear along x in the middle, last increment",
         "grid/bodies",
         "contact/bodies/-1/shear",
-        ("mm", "MPa"),
     ),
-    CurvesOf("tangential force over motion", "history/shift_x", "history/Qx", ("mm", "N")),
-    CurvesOf("normal force over approach", "history/approach", "history/P", ("mm", "N")),
+    CurvesOf("tangential force over motion", "history/shift_x", "history/Qx"),
+    CurvesOf("normal force over approach", "history/approach", "history/P"),
 )
 
 
 def main_results(case: BodiesCase, summary: Summary) -> list[SummaryQuantity]:
     """Return the main results of the last state and cycle, with the error of each by increments."""
     last, loop = summary["states"][-1], summary["loop"] or {}
-    line = "contact_half_width" in last
+    line, history = "contact_half_width" in last, LAYOUT.datasets("history")
 
     def of(text: str, path: str, unit: str, where: str = LAST) -> SummaryQuantity:
         place = "loop" if where == LOOP else "last"
@@ -64,25 +62,24 @@ def main_results(case: BodiesCase, summary: Summary) -> list[SummaryQuantity]:
         return SummaryQuantity(where, text, path, unit, **estimate(summary, error, BY_INCREMENTS))
 
     quantities = [
-        of(f"{LOADS[name][1]}, {name}", f"states.-1.{name}", unit_in(line, LOADS[name][0]))
+        of(f"{history[name].description}, {name}", f"states.-1.{name}", history[name].unit_in(line))
         for name in _large(last, FORCES)
     ]
     quantities += [
-        of(MOTIONS[name], f"states.-1.{name}", RIGID_MOTIONS[name][0])
+        of(MOTIONS[name], f"states.-1.{name}", history[name].unit)
         for name in _large(last, ("approach", "shift_x", "shift_y"))
     ]
     for name, (unit, text) in NUMBERS.items():
         quantities.append(of(text, f"states.-1.{name}", unit_in(line, unit)))
     if loop:
-        (force_unit, force), motion = LOADS[loop["force"]], loop["motion"]
-        energy, amplitude = unit_in(line, "N mm"), RIGID_MOTIONS[motion][0]
+        force, motion = history[loop["force"]], loop["motion"]
         quantities += [
-            of("energy dissipated", "loop.energy", energy, LOOP),
-            of(f"amplitude of the {MOTIONS[motion]}", "loop.amplitude", amplitude, LOOP),
+            of("energy dissipated", "loop.energy", unit_in(line, "N mm"), LOOP),
+            of(f"amplitude of the {MOTIONS[motion]}", "loop.amplitude", history[motion].unit, LOOP),
             of(
-                f"amplitude of the {force}",
+                f"amplitude of the {force.description}",
                 "loop.force_amplitude",
-                unit_in(line, force_unit),
+                force.unit_in(line),
                 LOOP,
             ),
         ]

@@ -10,16 +10,10 @@ import numpy as np
 
 from sa_solver.contact_state import ContactState
 from sa_solver.cycles.history import History
-from sa_solver.types import Array, Frame, Grid
+from sa_solver.types import Array, Frame, Grid, Mask
 from workflow.analyses.contact.case import BodiesCase
-from workflow.analyses.contact.load_table import LoadTable
-from workflow.analyses.contact.output.datasets import (
-    BODIES,
-    LOADS,
-    RIGID_MOTIONS,
-    ContactContents,
-    traction_fields,
-)
+from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
+from workflow.analyses.contact.output.layout import BODIES, LAYOUT, ContactContents
 from workflow.analyses.contact.output.summary import (
     increments_errors,
     loop_summary,
@@ -29,18 +23,13 @@ from workflow.analyses.contact.output.summary import (
 )
 from workflow.case.text.plain import counted
 from workflow.shell.analysis import Run
-from workflow.shell.output.dataset import Dataset, described
-from workflow.shell.output.results import CurveAxis, On, run_results
+from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish
 
 ContactRun = Run[BodiesCase]
 
 # Attributes of a history in the summary.
 HISTORY = "method", "reason", "parts", "error", "error_of", "energy_error"
-BULK_STRESSES = {
-    "bulk_stress_1": ("MPa", "stress along x in body 1 far below the contact"),
-    "bulk_stress_2": ("MPa", "stress along x in body 2 far above the contact"),
-}
 
 
 @dataclass(frozen=True)
@@ -78,47 +67,40 @@ def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
     """Write ``results.h5`` with the states that were computed."""
     case, grid, history = outcome.case, outcome.grid, outcome.history
     friction = case.friction.coefficient
-    height = Dataset(outcome.height, "mm", "gap before loading")
-    with run_results(run, case, {"friction": friction}, grid.line) as writer:
+    with run_results(run, case, LAYOUT, {"friction": friction}, grid.line) as writer:
         writer.put_contents(_contents(outcome))
         writer.put_grid(f"grid/{BODIES}", grid, Frame(np.zeros(3), np.eye(3)))
-        writer.put(f"surfaces/{BODIES}", {"height": height}, On(f"grid/{BODIES}"))
-        writer.put("path", _path(outcome.table))
+        writer.put(f"surfaces/{BODIES}", {"height": outcome.height})
+        writer.put("path", outcome.table.columns)
         method = {"method": history.method, "reason": history.reason, "parts": history.parts}
-        writer.put("history", _columns(history, friction), CurveAxis("increment"), **method)
+        writer.put("history", _columns(history, friction), **method)
         for index, state in zip(history.indices, history.states, strict=True):
             place = f"contact/{BODIES}/{index + 1:05d}"
-            fields = _fields(state, friction)
-            writer.put(place, fields, On(f"grid/{BODIES}"), increment=index + 1)
+            writer.put(place, _fields(state, friction), increment=index + 1)
 
 
-def _path(table: LoadTable) -> dict[str, Dataset]:
-    """Return the loads and motions that the path imposes, ``(n,)`` each."""
-    quantities = LOADS | RIGID_MOTIONS | BULK_STRESSES
-    return {name: Dataset(column, *quantities[name]) for name, column in table.columns.items()}
-
-
-def _columns(history: History, friction: float) -> dict[str, Dataset]:
+def _columns(history: History, friction: float) -> dict[str, Array]:
     """Return resultants, rigid motions and energies of the computed increments, ``(n,)`` each."""
     forces = np.array([state.resultants for state in history.states])
     motions = np.array([state.rigid for state in history.states])
     energies = np.array([state.energy for state in history.states])
-    sliding = np.array([slides(state, friction) for state in history.states])
-    increment = np.array(history.indices) + 1
     return {
-        "increment": Dataset(increment, "1", "row of the path, counted from 1"),
-        **described(LOADS, (*forces.T, *energies.T, sliding)),
-        **described(RIGID_MOTIONS, motions.T),
+        "increment": np.array(history.indices) + 1,
+        **dict(zip(FORCES, forces.T, strict=True)),
+        **dict(zip(("Edx", "Edy"), energies.T, strict=True)),
+        "sliding": np.array([slides(state, friction) for state in history.states]),
+        **dict(zip(MOTIONS, motions.T, strict=True)),
     }
 
 
-def _fields(state: ContactState, friction: float) -> dict[str, Dataset]:
+def _fields(state: ContactState, friction: float) -> dict[str, Array | Mask]:
     """Return fields of the contact in one increment."""
-    sticking = stick_zone(state, friction)
     return {
-        **traction_fields(state.traction[2], state.traction[:2], state.slip),
-        "gap": Dataset(state.gap, "mm", "distance of the deformed faces"),
-        "sticking": Dataset(sticking, "1", "whether the cell is pressed and its shear below µp"),
+        "pressure": state.traction[2],
+        "shear": state.traction[:2],
+        "slip": state.slip,
+        "gap": state.gap,
+        "sticking": stick_zone(state, friction),
     }
 
 

@@ -12,39 +12,33 @@ from fe_models.dynamics.curves.forced_response import ResponseBranch
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray
 from sa_solver.types import Array
-from workflow.analyses.vibration.output.outcome import RESONANCE, Response
+from workflow.analyses.vibration.output.layout import CONVENTION
+from workflow.analyses.vibration.output.outcome import CURVE, RESONANCE, Response
+from workflow.layout.declared import Arrays
 from workflow.models.rig.rig_model import RigModel
-from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.output.tables import DIGITS, heading, write_table
 from workflow.shell.terminal.reporter import Reporter
 
-# Groups of results: points of a curve, and motions at the frequencies of a case.
-CURVE, ANSWER = "curve", "at_{:05d}"
-CONVENTION = "x(t) = sum of Re(c_k exp(i k 2 pi f t)), forces being sines at t = 0"
 MEGABYTE = 1e6
 
 
-def names_of(rig: RigModel) -> dict[str, Dataset]:
+def names_of(rig: RigModel) -> Arrays:
     """Return names of the places ``(p,)`` and of the joints' directions ``(j, d)``."""
     places = np.array([rig.model.names[place] for place in rig.retained], dtype=np.bytes_)
     joints = np.array(rig.stretched, dtype=np.bytes_).reshape(rig.joints, rig.directions)
-    stretch = "of every direction of every joint: what it stretches by"
-    return {
-        "places": Dataset(places, "1", "whose displacements have harmonics"),
-        "joints": Dataset(joints, "1", stretch),
-    }
+    return {"places": places, "joints": joints}
 
 
-def harmonics_of(rig: RigModel, motion: HarmonicSolution) -> dict[str, Dataset]:
+def harmonics_of(rig: RigModel, motion: HarmonicSolution) -> Arrays:
     """Return coefficients ``(k, p)`` of places and ``(k, j, d)`` of joints, of one motion."""
     orders, parts = motion.resolution.harmonics, _coefficients(rig, motion)
     return {
-        "frequency": Dataset(np.array(motion.frequency), "Hz", "f, of the motion"),
-        **_datasets(np.array(orders), parts, "by harmonic"),
+        "frequency": np.array(motion.frequency),
+        **_arrays(np.array(orders), parts),
     }
 
 
-def harmonics_along(rig: RigModel, branch: ResponseBranch, reporter: Reporter) -> Datasets:
+def harmonics_along(rig: RigModel, branch: ResponseBranch, reporter: Reporter) -> Arrays:
     """Return coefficients of all points of a curve, with the points along the first axis.
 
     Harmonics that a motion does not have are 0.
@@ -62,9 +56,7 @@ def harmonics_along(rig: RigModel, branch: ResponseBranch, reporter: Reporter) -
     parts = tuple(np.array(part) for part in zip(*along, strict=True))
     size = sum(part.nbytes for part in parts) / MEGABYTE
     reporter.log(f"harmonics along the curve: {size:.3g} MB before they are packed")
-    frequency = Dataset(branch.frequencies, "Hz", "f, in the order of the curve")
-    datasets = _datasets(np.array(orders), parts, "by point of the curve and harmonic")
-    return {"frequency": frequency, **datasets}
+    return {"frequency": branch.frequencies, **_arrays(np.array(orders), parts)}
 
 
 def _coefficients(rig: RigModel, motion: HarmonicSolution) -> tuple[ComplexArray, ...]:
@@ -77,41 +69,36 @@ def _coefficients(rig: RigModel, motion: HarmonicSolution) -> tuple[ComplexArray
     return motion.motion[:, rig.retained], moved, pulled
 
 
-def _datasets(orders: Array, parts: tuple[ComplexArray, ...], along: str) -> dict[str, Dataset]:
+def _arrays(orders: Array, parts: tuple[ComplexArray, ...]) -> Arrays:
     places, moved, pulled = parts
     return {
-        "harmonic": Dataset(orders, "1", "k"),
-        "displacement": Dataset(
-            places, "mm", f"c_k of places against the ground, {along}: {CONVENTION}"
-        ),
-        "joint_displacement": Dataset(moved, "mm", f"c_k of joints, {along}: {CONVENTION}"),
-        "joint_force": Dataset(
-            pulled, "N", f"c_k of what joints resist with, {along}: {CONVENTION}"
-        ),
+        "harmonic": orders,
+        "displacement": places,
+        "joint_displacement": moved,
+        "joint_force": pulled,
     }
 
 
 # --- table --------------------------------------------------------------------------------------
 
 
-def write_harmonics(path: Path, names: Datasets, response: Response) -> None:
+def write_harmonics(path: Path, names: Arrays, response: Response) -> None:
     """Write the motions at resonance and at the frequencies of the case, one harmonic per row.
 
     Motions at frequencies of the case are counted from 1, as the rows of their table.
     """
     rows = [
         row
-        for group, datasets in response.harmonics.items()
+        for group, values in response.harmonics.items()
         if group != CURVE
-        for row in _rows(group, datasets, names)
+        for row in _rows(group, values, names)
     ]
     write_table(path, _columns(rows), DIGITS, note=f"{CONVENTION}; against the ground")
 
 
-def _rows(group: str, datasets: Datasets, names: Datasets) -> Iterator[Mapping[str, Any]]:
-    values = {name: dataset.values for name, dataset in datasets.items()}
+def _rows(group: str, values: Arrays, names: Arrays) -> Iterator[Mapping[str, Any]]:
     motion = RESONANCE if group == RESONANCE else str(int(group.rpartition("_")[2]) + 1)
-    places, joints = (names[kind].values.ravel().tolist() for kind in ("places", "joints"))
+    places, joints = (names[kind].ravel().tolist() for kind in ("places", "joints"))
     for k, order in enumerate(values["harmonic"].tolist()):
         begin = {
             heading("frequency", "Hz"): float(values["frequency"]),

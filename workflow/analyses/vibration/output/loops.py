@@ -24,7 +24,6 @@ from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.output.outcome import Curves
 from workflow.models.rig.laws import grouped
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
 
 # A loop counts as stuck where its energy is below this share of stroke times force range.
@@ -89,13 +88,10 @@ def loop_of(
     force = motion.cycle.samples[:, rows, along].sum(axis=1)
     total = motion.cycle.force[rows, :, along].sum(axis=0)
     expansion = motion.resolution.basis @ total
-    moved = "between the targets, or the mean of the joints, in a cycle"
-    datasets = {
-        "displacement": Dataset(closed(displacement), "mm", moved),
-        "force": Dataset(closed(force), "N", "of all joints together along it"),
-        "expansion": Dataset(
-            closed(expansion), "N", "the same in the harmonics of the motion alone"
-        ),
+    arrays = {
+        "displacement": closed(displacement),
+        "force": closed(force),
+        "expansion": closed(expansion),
     }
     half = 0.5 * float(np.ptp(force))
     numbers = {
@@ -110,7 +106,7 @@ def loop_of(
         "deformation": float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0,
         **_slopes(model, motion, displacement, force, load, rows),
     }
-    return Curves(datasets, numbers)
+    return Curves(arrays, numbers)
 
 
 def closed(values: Array) -> Array:

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.shell.output.dataset import Datasets
+from workflow.layout.declared import Arrays
 
 # Groups of a response, in addition to its own curves.
 NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
 # Motions at the frequencies of the case, and harmonics of motions.
 AT, HARMONICS = "at", "harmonics"
+# Harmonics at the points of a curve, and of motions at the frequencies of the case.
+CURVE, ANSWER = "curve", "at_{:05d}"
 # Natural frequencies by nodal diameters.
 DIAMETERS = "nodal_diameters"
 # Properties of the ring, in the summary.
@@ -27,19 +29,21 @@ BIFURCATIONS = "bifurcations"
 Bifurcations = tuple[Mapping[str, Any], ...]
 # Motions along the force at a frequency.
 FORCE_SWEEPS = "force_sweeps"
+# Motions under each force, and the curve of phase resonance through all of them.
+RESPONSES, BACKBONE = "responses", "backbone"
 # Modes over their amplitude.
 MODES = "modes"
 
 
 @dataclass(frozen=True)
 class Curves:
-    """A curve: ``datasets`` by name, with the first axis of each along the curve.
+    """A curve: ``arrays`` by name, with the first axis of each along the curve.
 
     ``numbers`` are attributes of the curve, ``bifurcations`` the points where its stability
     changes.
     """
 
-    datasets: Datasets
+    arrays: Arrays
     numbers: Mapping[str, Any]
     bifurcations: Bifurcations = ()
 
@@ -48,11 +52,11 @@ class Curves:
 class Answers:
     """The motions under a force at the frequencies that a case asks for.
 
-    ``datasets`` by name have a row for each motion, by frequency and in the order of the curve.
+    ``arrays`` by name have a row for each motion, by frequency and in the order of the curve.
     ``numbers`` has the values of each frequency, for the summary.
     """
 
-    datasets: Datasets
+    arrays: Arrays
     numbers: tuple[Mapping[str, Any], ...]
 
 
@@ -68,13 +72,13 @@ class Response:
     """
 
     force: float
-    curves: Datasets
+    curves: Arrays
     numbers: Mapping[str, Any]
-    nodes: Datasets
-    resonance: Datasets | None = None
+    nodes: Arrays
+    resonance: Arrays | None = None
     loops: tuple[Curves, ...] = ()
     answers: Answers | None = None
-    harmonics: Mapping[str, Datasets] = field(default_factory=dict)
+    harmonics: Mapping[str, Arrays] = field(default_factory=dict)
     bifurcations: Bifurcations = ()
 
 
@@ -93,21 +97,21 @@ class VibrationOutcome:
 
     case: VibrationCase
     labels: tuple[str, ...]
-    names: Datasets
+    names: Arrays
     responses: tuple[Response, ...]
-    linear: Datasets
+    linear: Arrays
     numbers: Mapping[str, Any]
-    contact: Datasets | None = None
+    contact: Arrays | None = None
     backbone: Curves | None = None
     force_sweeps: tuple[Curves, ...] = ()
     modes: tuple[Curves, ...] = ()
     further: tuple[Curves, ...] = ()
-    diameters: Datasets | None = None
+    diameters: Arrays | None = None
 
     @property
     def _joints(self) -> int:
         """Number of joints, 0 where none of them ever slips or separates."""
-        shares = [r.nodes[name].values for r in self.responses for name in ("slip", "separated")]
+        shares = [r.nodes[name] for r in self.responses for name in ("slip", "separated")]
         return shares[0].shape[1] if any(share.any() for share in shares) else 0
 
     @property

@@ -58,14 +58,11 @@ CURVES = (
         "amplitude",
         "responses/*/frequency",
         "responses/*/amplitude",
-        ("Hz", "mm"),
         logarithmic=True,
     ),
-    CurvesOf(
-        "loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force", ("mm", "N")
-    ),
-    CurvesOf("phase resonance", "backbone/force", "backbone/frequency", ("", "Hz")),
-    CurvesOf("mode", "modes/*/amplitude", "modes/*/frequency", ("mm", "Hz")),
+    CurvesOf("loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force"),
+    CurvesOf("phase resonance", "backbone/force", "backbone/frequency"),
+    CurvesOf("mode", "modes/*/amplitude", "modes/*/frequency"),
 )
 
 

@@ -7,9 +7,11 @@ from math import degrees, pi
 from typing import Any
 
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.output.harmonics import CURVE, write_harmonics
+from workflow.analyses.vibration.output.harmonics import write_harmonics
+from workflow.analyses.vibration.output.layout import bifurcation_columns, layout_of
 from workflow.analyses.vibration.output.outcome import (
     AT,
+    BACKBONE,
     BIFURCATIONS,
     DIAMETERS,
     FORCE_SWEEPS,
@@ -19,6 +21,7 @@ from workflow.analyses.vibration.output.outcome import (
     MODES,
     NODES,
     RESONANCE,
+    RESPONSES,
     RING,
     Answers,
     Bifurcations,
@@ -26,16 +29,16 @@ from workflow.analyses.vibration.output.outcome import (
     Response,
     VibrationOutcome,
 )
-from workflow.analyses.vibration.stability import bifurcation_datasets, columns_for
+from workflow.analyses.vibration.stability import bifurcation_arrays
 from workflow.case.text.plain import counted
+from workflow.layout.declared import Layout
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.results import CurveAxis, ResultsWriter, run_results
+from workflow.shell.output.results import ResultsWriter, run_results
 from workflow.shell.output.summary import finish
 from workflow.shell.output.tables import DIGITS, heading, write_curves, write_table
 
-RESPONSES, BACKBONE = "responses", "backbone"
 TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
 TO_RPM = 30.0 / pi  # rad/s to rpm
 
@@ -61,33 +64,32 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
         "seen": list(outcome.labels),
         "engine_order": case.engine_order,
     }
-    with run_results(run, case, attributes) as writer:
+    with run_results(run, case, layout_of(case.amount), attributes) as writer:
         writer.put_contents(outcome.contents)
-        along = CurveAxis(case.amount.name)
         limits = {name: outcome.numbers[name] for name in ("free", "stuck", "sliding")}
-        writer.put("linear", outcome.linear, CurveAxis("frequency"), **limits)
+        writer.put("linear", outcome.linear, **limits)
         writer.put("names", outcome.names)
         if outcome.diameters is not None:
             ring = outcome.numbers[RING]
-            writer.put(DIAMETERS, outcome.diameters, CurveAxis("diameters"), **ring)
+            writer.put(DIAMETERS, outcome.diameters, **ring)
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
             _put_response(writer, f"{RESPONSES}/{number:05d}", case.amount, response)
         if outcome.backbone is not None:
-            writer.put(BACKBONE, outcome.backbone.datasets, along, **outcome.backbone.numbers)
+            writer.put(BACKBONE, outcome.backbone.arrays, **outcome.backbone.numbers)
             _put_bifurcations(writer, BACKBONE, outcome.backbone.bifurcations, case.amount)
         for number, branch in enumerate(outcome.further):
             place = f"{FURTHER}/{number:05d}"
-            writer.put(place, branch.datasets, CurveAxis("frequency"), **branch.numbers)
+            writer.put(place, branch.arrays, **branch.numbers)
             _put_bifurcations(writer, place, branch.bifurcations, case.amount)
         for number, sweep in enumerate(outcome.force_sweeps):
             place = f"{FORCE_SWEEPS}/{number:05d}"
-            writer.put(place, sweep.datasets, along, **sweep.numbers)
+            writer.put(place, sweep.arrays, **sweep.numbers)
             _put_bifurcations(writer, place, sweep.bifurcations, case.amount)
         for number, mode in enumerate(outcome.modes):
             place = f"{MODES}/{number:05d}"
-            writer.put(place, mode.datasets, CurveAxis("modal_amplitude"), **mode.numbers)
+            writer.put(place, mode.arrays, **mode.numbers)
 
 
 def _put_response(
@@ -98,12 +100,11 @@ def _put_response(
     if response.resonance is not None:
         writer.put(f"{place}/{RESONANCE}", response.resonance)
     for number, loop in enumerate(response.loops):
-        writer.put(f"{place}/{LOOPS}/{number:05d}", loop.datasets, **loop.numbers)
+        writer.put(f"{place}/{LOOPS}/{number:05d}", loop.arrays, **loop.numbers)
     if response.answers is not None:
-        writer.put(f"{place}/{AT}", response.answers.datasets)
-    for of, datasets in response.harmonics.items():
-        along = CurveAxis("frequency") if of == CURVE else None
-        writer.put(f"{place}/{HARMONICS}/{of}", datasets, along)
+        writer.put(f"{place}/{AT}", response.answers.arrays)
+    for of, arrays in response.harmonics.items():
+        writer.put(f"{place}/{HARMONICS}/{of}", arrays)
     _put_bifurcations(writer, place, response.bifurcations, amount)
 
 
@@ -113,8 +114,8 @@ def _put_bifurcations(
     """Write the bifurcations of the curve at a place, if there are any."""
     if bifurcations:
         kinds = [str(found["kind"]) for found in bifurcations]
-        datasets = bifurcation_datasets(bifurcations, amount)
-        writer.put(f"{place}/{BIFURCATIONS}", datasets, kind=kinds)
+        arrays = bifurcation_arrays(bifurcations, amount)
+        writer.put(f"{place}/{BIFURCATIONS}", arrays, kind=kinds)
 
 
 def put_response_curves(
@@ -122,7 +123,7 @@ def put_response_curves(
 ) -> None:
     """Write the curves of a response and its numbers."""
     numbers = {amount.name: response.force, **response.numbers}
-    writer.put(place, response.curves, CurveAxis("frequency"), **numbers)
+    writer.put(place, response.curves, **numbers)
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -130,26 +131,29 @@ def put_response_curves(
 
 def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
     """Write responses, backbone, force sweeps and all other curves as CSV."""
-    _write_responses(outcome, folder)
+    layout = layout_of(outcome.case.amount)
+    _write_responses(outcome, folder, layout)
     if outcome.diameters is not None:
         path = folder.reserve(f"{DIAMETERS}.csv", "natural frequencies, over nodal diameters")
-        write_curves(path, outcome.diameters)
+        write_curves(path, outcome.diameters, layout.datasets(DIAMETERS))
     if outcome.backbone is not None:
         path = folder.reserve(
             f"{BACKBONE}.csv", f"phase resonance, over the {outcome.case.amount.name}"
         )
-        write_curves(path, outcome.backbone.datasets)
+        write_curves(path, outcome.backbone.arrays, layout.datasets(BACKBONE))
     for number, sweep in enumerate(outcome.force_sweeps):
         what = f"response at {sweep.numbers['frequency']:g} Hz, over the {outcome.case.amount.name}"
-        write_curves(folder.reserve(f"force_sweep_{number:05d}.csv", what), sweep.datasets)
+        path = folder.reserve(f"force_sweep_{number:05d}.csv", what)
+        write_curves(path, sweep.arrays, layout.datasets(f"{FORCE_SWEEPS}/-"))
     for mode in outcome.modes:
         what = f"mode {mode.numbers['mode']}, over its amplitude"
         path = folder.reserve(f"mode_{mode.numbers['mode']:05d}.csv", what)
-        write_curves(path, mode.datasets)
+        write_curves(path, mode.arrays, layout.datasets(f"{MODES}/-"))
     amount = outcome.case.amount
     for number, branch in enumerate(outcome.further):
         what = f"further branch {amount.under(branch.numbers[amount.name])}, over frequency"
-        write_curves(folder.reserve(f"further_branch_{number:05d}.csv", what), branch.datasets)
+        path = folder.reserve(f"further_branch_{number:05d}.csv", what)
+        write_curves(path, branch.arrays, layout.datasets(f"{FURTHER}/-"))
     found = list(_every_bifurcation(outcome))
     if found:
         path = folder.reserve(f"{BIFURCATIONS}.csv", "where the stability of motions changes")
@@ -157,25 +161,28 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
             "curve": [curve for curve, _ in found],
             "kind": [each["kind"] for _, each in found],
         }
-        for name, (unit, _) in columns_for(amount).items():
-            columns[heading(name, unit)] = [each[name] for _, each in found]
+        for name, declared in bifurcation_columns(amount).items():
+            columns[heading(name, declared.unit)] = [each[name] for _, each in found]
         write_table(path, columns, DIGITS)
 
 
-def _write_responses(outcome: VibrationOutcome, folder: OutputFolder) -> None:
+def _write_responses(outcome: VibrationOutcome, folder: OutputFolder, layout: Layout) -> None:
     """Write responses, their harmonics, their finest loops, and motions at given frequencies."""
+    place = f"{RESPONSES}/-"
+    declared = layout.datasets(place)
     for number, response in enumerate(outcome.responses):
         under = f"{outcome.case.amount.under(response.force)}"
         path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
-        write_curves(path, response.curves)
+        write_curves(path, response.curves, declared)
         path = folder.reserve(f"joints_{number:05d}.csv", f"what each joint does {under}")
-        write_curves(path, {"frequency": response.curves["frequency"], **response.nodes})
+        nodes = {"frequency": response.curves["frequency"], **response.nodes}
+        write_curves(path, nodes, {**declared, **layout.datasets(f"{place}/{NODES}")})
         if response.loops:
             path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
-            write_curves(path, response.loops[-1].datasets)
+            write_curves(path, response.loops[-1].arrays, layout.datasets(f"{place}/{LOOPS}/-"))
         if response.answers is not None:
             path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as asked for")
-            write_curves(path, response.answers.datasets)
+            write_curves(path, response.answers.arrays, layout.datasets(f"{place}/{AT}"))
         what = f"harmonics of places and joints {under}, at resonance and as asked for"
         path = folder.reserve(f"harmonics_{number:05d}.csv", what)
         write_harmonics(path, outcome.names, response)
@@ -208,7 +215,7 @@ def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
         ],
     }
     if outcome.backbone is not None:
-        points = len(outcome.backbone.datasets["frequency"].values)
+        points = len(outcome.backbone.arrays["frequency"])
         summary[BACKBONE] = {"points": points, **_curve_summary(outcome.backbone)}
     if outcome.force_sweeps:
         summary[FORCE_SWEEPS] = [_curve_summary(sweep) for sweep in outcome.force_sweeps]
@@ -326,7 +333,7 @@ def _further_line(amount: ExcitationSize, branch: Curves) -> str:
 
 def _backbone_line(amount: ExcitationSize, backbone: Curves) -> str:
     (first, last), (low, high) = (
-        backbone.datasets[name].values[[0, -1]] for name in ("frequency", amount.name)
+        backbone.arrays[name][[0, -1]] for name in ("frequency", amount.name)
     )
     return (
         f"phase resonance: {first:.5g} Hz {amount.under(low)}, {last:.5g} Hz under "
@@ -336,7 +343,7 @@ def _backbone_line(amount: ExcitationSize, backbone: Curves) -> str:
 
 def _mode_line(mode: Curves) -> str:
     numbers = mode.numbers
-    least, largest = mode.datasets["amplitude"].values[[0, -1]]
+    least, largest = mode.arrays["amplitude"][[0, -1]]
     first, last = numbers["frequency"]
     return (
         f"mode {numbers['mode']}: {first:.5g} Hz at {TO_MICRONS * least:.3g} um, {last:.5g} Hz at "

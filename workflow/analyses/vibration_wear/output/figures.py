@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from sa_solver.types import Array, Indices
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.figures.stability import draw_motions, explain_stability
+from workflow.analyses.vibration.output.outcome import RESPONSES
 from workflow.analyses.vibration_wear.output.outcome import (
     CONTACT,
     EVOLUTION,
@@ -21,7 +22,6 @@ from workflow.analyses.vibration_wear.output.outcome import (
     LOOP,
     NODES,
     PLACES,
-    RESPONSES,
     WORN,
     VibrationWearContents,
 )

@@ -40,19 +40,16 @@ ERRORS = {
 }
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
-    CurvesOf("worn depth", "evolution/cycles", "evolution/depth", ("1", "mm")),
-    CurvesOf("worn volume", "evolution/cycles", "evolution/volume", ("1", "mm^3")),
-    CurvesOf("tangential stiffness", "evolution/cycles", "evolution/stiffness", ("1", "N/mm")),
+    CurvesOf("worn depth", "evolution/cycles", "evolution/depth"),
+    CurvesOf("worn volume", "evolution/cycles", "evolution/volume"),
+    CurvesOf("tangential stiffness", "evolution/cycles", "evolution/stiffness"),
     CurvesOf(
         "amplitude in the last state",
         "worn/-1/responses/*/frequency",
         "worn/-1/responses/*/amplitude",
-        ("Hz", "mm"),
         logarithmic=True,
     ),
-    CurvesOf(
-        "loop in the last state", "worn/-1/loop/displacement", "worn/-1/loop/force", ("mm", "N")
-    ),
+    CurvesOf("loop in the last state", "worn/-1/loop/displacement", "worn/-1/loop/force"),
 )
 
 

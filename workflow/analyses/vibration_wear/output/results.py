@@ -6,30 +6,30 @@ from typing import Any
 
 import numpy as np
 
-from workflow.analyses.vibration.output.outcome import trend
+from workflow.analyses.vibration.output.outcome import RESPONSES, trend
 from workflow.analyses.vibration.output.results import put_response_curves
 from workflow.analyses.vibration_wear.case import (
     FrictionRigWearCase,
     ReducedWearCase,
     VibrationWearCase,
 )
+from workflow.analyses.vibration_wear.output.layout import layout_of
 from workflow.analyses.vibration_wear.output.outcome import (
     EVOLUTION,
     NODES,
     PLACES,
     POSITION,
-    RESPONSES,
     WORN,
     VibrationWearContents,
     VibrationWearOutcome,
     WornNodes,
     WornRig,
 )
+from workflow.layout.declared import Arrays, Layout
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.dataset import Dataset
-from workflow.shell.output.results import CurveAxis, On, run_results
+from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish
 from workflow.shell.output.tables import DIGITS, heading, write_curves, write_table
 
@@ -61,7 +61,7 @@ def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWea
 def _contents(outcome: VibrationWearOutcome) -> VibrationWearContents:
     if outcome.nodes is None:
         return VibrationWearContents(at_nodes=False)
-    known = outcome.nodes.datasets
+    known = outcome.nodes.arrays
     on_plane = "x" in known
     return VibrationWearContents(
         at_nodes=True, placed=on_plane or POSITION in known, on_plane=on_plane
@@ -75,28 +75,40 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
         "forces": list(case.amounts),
         "amount": case.amount.name,
     }
-    with run_results(run, case, attributes) as writer:
+    with run_results(run, case, layout_of(case.amount), attributes) as writer:
         writer.put_contents(_contents(outcome))
         if outcome.grid is not None:
             writer.put_grid("grid", outcome.grid)
         if outcome.nodes is not None:
-            writer.put(PLACES, {**outcome.nodes.datasets, **_named(outcome.nodes)})
-        writer.put(EVOLUTION, outcome.evolution, CurveAxis("cycles"))
+            writer.put(PLACES, {**outcome.nodes.arrays, **_named(outcome.nodes)})
+        writer.put(EVOLUTION, _evolution(outcome))
         for number, state in enumerate(outcome.states):
             place = f"{WORN}/{number:05d}"
             writer.put(place, {}, **state.numbers)
-            on = None if outcome.grid is None else On("grid")
-            for group, datasets in state.fields.items():
-                writer.put(f"{place}/{group}", datasets, on)
+            for group, arrays in state.fields.items():
+                writer.put(f"{place}/{group}", arrays)
             for force, response in enumerate(state.responses):
                 where = f"{place}/{RESPONSES}/{force:05d}"
                 put_response_curves(writer, where, case.amount, response)
 
 
-def _named(nodes: WornNodes) -> dict[str, Dataset]:
+def _evolution(outcome: VibrationWearOutcome) -> Arrays:
+    """Return numbers of all states against cycles ``(k,)``; those of each force ``(k, forces)``."""
+    rows = [
+        {
+            **state.numbers,
+            "resonance": [response.numbers["resonance"] for response in state.responses],
+            "receptance": [response.numbers["receptance"] for response in state.responses],
+        }
+        for state in outcome.states
+    ]
+    declared = layout_of(outcome.case.amount).datasets(EVOLUTION)
+    return {name: np.array([row[name] for row in rows]) for name in declared if name in rows[0]}
+
+
+def _named(nodes: WornNodes) -> Arrays:
     """Return the names of nodes, empty if they have none."""
-    names = np.array(nodes.names, dtype=np.bytes_)
-    return {"name": Dataset(names, "1", "of the point of each contact")} if nodes.names else {}
+    return {"name": np.array(nodes.names, dtype=np.bytes_)} if nodes.names else {}
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -105,27 +117,33 @@ def _named(nodes: WornNodes) -> dict[str, Dataset]:
 def _write_tables(outcome: VibrationWearOutcome, folder: OutputFolder) -> None:
     """Write the evolution and the responses of every state to every force as CSV, in base units."""
     under, what = outcome.case.amount.under, "contact and resonances, over the cycles"
-    write_curves(folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution)
+    layout = layout_of(outcome.case.amount)
+    path = folder.reserve(f"{EVOLUTION}.csv", what)
+    write_curves(path, _evolution(outcome), layout.datasets(EVOLUTION))
+    of_response = layout.datasets(f"{WORN}/-/{RESPONSES}/-")
     for number, state in enumerate(outcome.states):
         for force, response in enumerate(state.responses):
             what = f"response {under(response.force)} after {state.cycles:g} cycles"
             path = folder.reserve(f"frf_{number:05d}_{force:05d}.csv", f"{what}, over frequency")
-            write_curves(path, response.curves)
+            write_curves(path, response.curves, of_response)
     if outcome.nodes is not None:
         for number, state in enumerate(outcome.states):
-            _write_nodes(outcome.nodes, number, state, folder)
+            _write_nodes(outcome.nodes, number, state, folder, layout)
 
 
-def _write_nodes(nodes: WornNodes, number: int, state: WornRig, folder: OutputFolder) -> None:
+def _write_nodes(
+    nodes: WornNodes, number: int, state: WornRig, folder: OutputFolder, layout: Layout
+) -> None:
     """Write depths and energies of the nodes in a state, a row for each node."""
     what = f"nodes after {state.cycles:g} cycles: gaps, depths, energies of a cycle"
     path = folder.reserve(f"{NODES}_{number:05d}.csv", what)
     columns: dict[str, Any] = {heading("point", ""): nodes.names} if nodes.names else {}
-    for name, dataset in {**nodes.datasets, **state.fields[NODES]}.items():
-        by_axis = dataset.values.reshape(len(dataset.values), -1).T
+    declared = {**layout.datasets(PLACES), **layout.datasets(f"{WORN}/-/{NODES}")}
+    for name, array in {**nodes.arrays, **state.fields[NODES]}.items():
+        by_axis = array.reshape(len(array), -1).T
         axes = "xyz" if len(by_axis) > 1 else ("",)
         for axis, values in zip(axes, by_axis, strict=True):
-            columns[heading(f"{name}_{axis}".strip("_"), dataset.unit)] = values
+            columns[heading(f"{name}_{axis}".strip("_"), declared[name].unit)] = values
     write_table(path, columns, DIGITS)
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from sa_solver.types import Array
 from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.output.layout import PARTS, RESULTS
-from workflow.shell.output.dataset import Dataset
 
 Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
 
@@ -25,16 +25,10 @@ def summary_of(errors: Mapping[str, ResultError]) -> dict[str, Any]:
     return {name: {**error.parts, "total": error.total} for name, error in errors.items()}
 
 
-def datasets_of(errors: Mapping[str, ResultError]) -> dict[str, Dataset]:
+def arrays_of(errors: Mapping[str, ResultError]) -> dict[str, Array]:
     """Return each result's parts in the order of ``PARTS``, nan if unknown, and their total."""
-    what = (
-        f"estimated relative errors by {', '.join(PARTS)}, above 0 where the result is too large, "
-        "and their total"
-    )
     return {
-        name: Dataset(
-            np.array([*(_number(error.parts.get(p, 0.0)) for p in PARTS), error.total]), "1", what
-        )
+        name: np.array([*(_number(error.parts.get(p, 0.0)) for p in PARTS), error.total])
         for name, error in errors.items()
     }
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from sa_solver.contact_state import ContactState
 from sa_solver.types import LoadHistory
-from workflow.analyses.contact.output.datasets import load_columns, traction_fields
-from workflow.shell.output.results import On, ResultsWriter
+from workflow.analyses.contact.output.layout import load_columns
+from workflow.shell.output.results import ResultsWriter
 
 # Increments shown, as shares of the way from the peak to the end of the cycle: 8, 12 and 15 of 22.
 SHOWN = 0.0, 2.0 / 7.0, 0.5
@@ -41,8 +41,8 @@ def write_comparison(
     # In a short cycle two of the increments may coincide, hence a set.
     for increment in sorted({peak + round(share * left) for share in SHOWN}):
         state = cycle[increment]
-        fields = traction_fields(state.pressure, state.shear, state.slip)
-        writer.put(f"{group}/{increment:05d}", fields, On(f"grid/{name}"))
+        fields = {"pressure": state.pressure, "shear": state.shear, "slip": state.slip}
+        writer.put(f"{group}/{increment:05d}", fields)
 
 
 def comparison_summary(

@@ -23,6 +23,7 @@ from workflow.pictures.panels import (
     whole_ticks,
 )
 from workflow.pictures.style import BLUE, GREEN, HEADROOM, ORANGE
+from workflow.shell.output.results import own
 
 NO_SLIDING = "no face slides as a whole"
 # Largest number of ranges of sliding increments in a title.
@@ -83,7 +84,8 @@ def _energies(
 
 def _history(file: h5py.File, interface: str) -> dict[str, Array]:
     """Return the resultants of a contact over the cycle, by name."""
-    return {k: v[()] for k, v in file["structure"][interface]["load_history"].items()}
+    history = file["structure"][interface]["load_history"]
+    return {name: history[name][()] for name in own(history)}
 
 
 def _cycles_shown(file: h5py.File, contents: WearContents) -> str:

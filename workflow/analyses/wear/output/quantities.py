@@ -9,8 +9,8 @@ from typing import Any
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.output.layout import MOMENTS, RESULTS
 from workflow.analyses.wear.output.measures import interfaces
+from workflow.layout.declared import unit_in
 from workflow.shell.analysis import Summary
-from workflow.shell.output.dataset import unit_in
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, number_at, told
 
@@ -32,27 +32,15 @@ PARAMETERS = {
 }
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
-    CurvesOf("depth worn from body 1", "kinetics/cycles", "kinetics/*/depth_1", ("1", "mm")),
-    CurvesOf("depth worn from body 2", "kinetics/cycles", "kinetics/*/depth_2", ("1", "mm")),
-    CurvesOf("volume worn from body 1", "kinetics/cycles", "kinetics/*/volume_1", ("1", "mm^3")),
-    CurvesOf("volume worn from body 2", "kinetics/cycles", "kinetics/*/volume_2", ("1", "mm^3")),
-    CurvesOf(
-        "pressure across the middle, unworn", "grid/*", "contact/*/00000/pressure", ("mm", "MPa")
-    ),
-    CurvesOf("pressure across the middle, worn", "grid/*", "contact/*/-1/pressure", ("mm", "MPa")),
-    CurvesOf("tangential loop, worn", "loops/*/-1/displacement", "loops/*/-1/force", ("mm", "N")),
-    CurvesOf(
-        "kt of tangential loops",
-        "loops_over_energy/*/energy",
-        "loops_over_energy/*/kt",
-        ("N mm", ""),
-    ),
-    CurvesOf(
-        "mu of tangential loops",
-        "loops_over_energy/*/energy",
-        "loops_over_energy/*/mu",
-        ("N mm", "1"),
-    ),
+    CurvesOf("depth worn from body 1", "kinetics/cycles", "kinetics/*/depth_1"),
+    CurvesOf("depth worn from body 2", "kinetics/cycles", "kinetics/*/depth_2"),
+    CurvesOf("volume worn from body 1", "kinetics/cycles", "kinetics/*/volume_1"),
+    CurvesOf("volume worn from body 2", "kinetics/cycles", "kinetics/*/volume_2"),
+    CurvesOf("pressure across the middle, unworn", "grid/*", "contact/*/00000/pressure"),
+    CurvesOf("pressure across the middle, worn", "grid/*", "contact/*/-1/pressure"),
+    CurvesOf("tangential loop, worn", "loops/*/-1/displacement", "loops/*/-1/force"),
+    CurvesOf("kt of tangential loops", "loops_over_energy/*/energy", "loops_over_energy/*/kt"),
+    CurvesOf("mu of tangential loops", "loops_over_energy/*/energy", "loops_over_energy/*/mu"),
 )
 
 

@@ -12,20 +12,25 @@ from sa_solver.normal.contact import NormalContactError
 from sa_solver.types import Array, Progress
 from wear.contact.contacts import KINETICS
 from wear.kinetics import LinearRegime
-from workflow.analyses.contact.output.datasets import LOADS, pressure_field, traction_fields
 from workflow.analyses.wear.budget.finding import ProbeResults, error_budget
-from workflow.analyses.wear.budget.report import Budget, datasets_of, sentences, summary_of
+from workflow.analyses.wear.budget.report import (
+    Budget,
+    arrays_of,
+    sentences,
+    summary_of,
+)
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.checks.comparison import comparison_summary, write_comparison
 from workflow.analyses.wear.checks.run_errors import warn_of_errors
 from workflow.analyses.wear.checks.uniformity import uniformities
-from workflow.analyses.wear.output.datasets import (
-    cycles_column,
-    kinetics_columns,
-    put_face,
-    surface_heights,
+from workflow.analyses.wear.output.datasets import kinetics_columns, put_face
+from workflow.analyses.wear.output.layout import (
+    EXTRAPOLATION,
+    LAYOUT,
+    MOMENTS,
+    WearContents,
+    energy_name,
 )
-from workflow.analyses.wear.output.layout import EXTRAPOLATION, MOMENTS, WearContents, energy_name
 from workflow.analyses.wear.output.link_report import link_summary
 from workflow.analyses.wear.output.outcome import STOPPED, InterfaceOutcome, Outcome
 from workflow.analyses.wear.stress.body_stress import StressedCycle, with_known_shear
@@ -47,8 +52,7 @@ from workflow.models.structure import StructureLoads
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.store import read_arrays
-from workflow.shell.output.dataset import Dataset
-from workflow.shell.output.results import CurveAxis, On, ResultsWriter, run_results
+from workflow.shell.output.results import ResultsWriter, run_results
 from workflow.shell.output.summary import finish
 from workflow.shell.terminal.reporter import Reporter
 
@@ -162,8 +166,7 @@ def _write_results(
     }
     coarse: list[str] = []
     nodes = case.contact.method == "nodes"
-    by = "nodal" if nodes else "half-space"
-    with run_results(run, case, attributes, source.line) as writer:
+    with run_results(run, case, LAYOUT, attributes, source.line) as writer:
         for contact in outcome.interfaces:
             stage, first, loads = contact.stage, contact.first, contact.unworn.loads
             writer.put_grid(f"grid/{stage.name}", stage.grid, stage.face.frame)
@@ -173,21 +176,20 @@ def _write_results(
             writer.put(place, {}, friction=stage.settings.friction(0.0))
             if not nodes and _write_coarse(writer, contact, source.peak):
                 coarse.append(stage.name)
-            dissipated = f"energy dissipated in each increment, {by} pressure"
-            energy = {energy_name(nodes): Dataset(first.energy, "N mm", dissipated)}
+            energy = {energy_name(nodes): first.energy}
             writer.put(f"contact/{stage.name}", energy | _holding_moments(contact))
             if first.cycle:
                 write_comparison(writer, stage.name, first.cycle, loads, source.peak)
         recorded = _write_jumps(writer, outcome, run.folder)
         _write_kinetics(writer, outcome, recorded)
-        write_loops(writer, run.folder, outcome.state.jump, outcome.source.line)
+        write_loops(writer, run.folder, outcome.state.jump)
         if structure is not None:
             structure.write(writer, case.accuracy)
             structure.bolts.write(writer, run.folder, outcome.state.jump)
         for stress in stresses:
             stress.write(writer)
         for name, errors in budget.items():
-            writer.put(f"error/{name}", datasets_of(errors), accuracy=case.accuracy)
+            writer.put(f"error/{name}", arrays_of(errors), accuracy=case.accuracy)
         contents = WearContents(
             names=tuple(sorted(contact.stage.name for contact in outcome.interfaces)),
             bodies=case.bodies,
@@ -212,14 +214,12 @@ def _write_results(
     return recorded, contents
 
 
-def _holding_moments(contact: InterfaceOutcome) -> dict[str, Dataset]:
+def _holding_moments(contact: InterfaceOutcome) -> dict[str, Array]:
     """Return the moments ``(t,)`` that hold the tilt, if it is held."""
     if contact.stage.settings.drive.tilt == "free":
         return {}
     return {
-        f"{name}_{when}": Dataset(
-            getattr(loads, name), "N mm", f"{LOADS[name][1]} that holds the tilt, {when}"
-        )
+        f"{name}_{when}": getattr(loads, name)
         for when, loads in contact.carried.items()
         for name in (("My",) if contact.stage.grid.line else ("Mx", "My"))
     }
@@ -239,7 +239,7 @@ def _write_coarse(writer: ResultsWriter, contact: InterfaceOutcome, peak: int) -
     grid = stage.coarse_grid
     place = f"contact/{stage.name}/coarse"
     writer.put_grid(place, grid)
-    writer.put(place, {"pressure": pressure_field(pressure)}, On(place))
+    writer.put(place, {"pressure": pressure})
     return True
 
 
@@ -258,9 +258,8 @@ def _write_jumps(
                 for kind, fields in JUMP_FIELDS.items()
             )
             place, pressure = f"{name}/{jump:05d}", tractions["pressure"]
-            heights, fields = surface_heights(**surfaces), traction_fields(**tractions)
-            writer.put(f"surfaces/{place}", heights, On(f"grid/{name}"), cycles=cycles)
-            writer.put(f"contact/{place}", fields, On(f"grid/{name}"), cycles=cycles)
+            writer.put(f"surfaces/{place}", surfaces, cycles=cycles)
+            writer.put(f"contact/{place}", tractions, cycles=cycles)
             peaks.area.append(np.count_nonzero(pressure > 0.0) * grid.cell_area)
             peaks.width.append(_extent(pressure) * grid.pitch[0])
             peaks.pressure.append(float(pressure.max()))
@@ -276,7 +275,7 @@ def _extent(pressure: Array) -> int:
 def _write_kinetics(
     writer: ResultsWriter, outcome: Outcome, recorded: dict[str, PeakHistory]
 ) -> None:
-    writer.put("kinetics", {"cycles": cycles_column(outcome.state.cycles)})
+    writer.put("kinetics", {"cycles": outcome.state.cycles})
     for contact in outcome.interfaces:
         name = contact.stage.name
         columns = kinetics_columns(contact.kinetics, np.array(recorded[name].area))
@@ -285,7 +284,7 @@ def _write_kinetics(
             for quantity, regime in contact.regimes.items()
             for attribute, field in REGIME_ATTRIBUTES.items()
         }
-        writer.put(f"kinetics/{name}", columns, CurveAxis("kinetics/cycles"), **regimes)
+        writer.put(f"kinetics/{name}", columns, **regimes)
 
 
 def _summary(

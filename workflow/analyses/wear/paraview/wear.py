@@ -27,8 +27,7 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import Face
 from fe_models.meshes.transfer import FaceTransfer
-from workflow.analyses.wear.output.datasets import OTHER_FACE
-from workflow.analyses.wear.output.layout import WearContents, jump_name
+from workflow.analyses.wear.output.layout import OTHER_FACE, WearContents, jump_name
 from workflow.analyses.wear.paraview.structure import write_structure
 from workflow.analyses.wear.paraview.subsurface import write_life, write_sections
 from workflow.analyses.wear.paraview.views import write_views

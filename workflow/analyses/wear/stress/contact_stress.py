@@ -35,16 +35,13 @@ from workflow.analyses.wear.stress.body_stress import (
     sections,
 )
 from workflow.models.contact import FaceContact
-from workflow.shell.output.dataset import Dataset
-from workflow.shell.output.results import On, ResultsWriter
+from workflow.shell.output.results import ResultsWriter
 from workflow.shell.terminal.reporter import Reporter
 
 # Share of the load whose shear may be unknown. A gap in the shear causes stress of the order of µp
 # at its rim, whatever its size. The cells at the edge of a sliding contact that have no slipping
 # node of the structure nearby stay below this share.
 STUCK_SHARE = 0.01
-
-LEFT_OUT = "increments without full knowledge of the shear, not in the life map"
 
 # Ruiz's maps that the summary reports; of other parameters it reports the parameter alone.
 RUIZ = ("cracking_parameter", "friction_parameter", "tension")
@@ -60,7 +57,7 @@ class BodyStress:
     """
 
     section: Array | None
-    maps: dict[str, Dataset]
+    maps: dict[str, Array]
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,7 @@ class InterfaceStress:
         """True if the fretting parameter is above 0 anywhere."""
         parameter = self.planes.settings.life.parameter
         name = RUIZ[0] if parameter == "ruiz" else parameter
-        return self.mapped and any(body.maps[name].values.any() for body in self._bodies)
+        return self.mapped and any(body.maps[name].any() for body in self._bodies)
 
     @property
     def _bodies(self) -> list[BodyStress]:
@@ -124,27 +121,22 @@ class InterfaceStress:
 
     def _write_section(self, writer: ResultsWriter, group: str) -> None:
         planes = self.planes
-        axes = {
-            "along": Dataset(planes.along, "mm", "centres of the section's cells, along its axis"),
-            "depths": Dataset(planes.depths, "mm", "of the section's points below the surface"),
-        }
         attributes = {"axis": planes.settings.section, "at": planes.at, "components": COMPONENTS}
         attributes["bulk_stress"] = self.bulk
         limits = {n: self.terms.materials[n - 1].yield_stress for n in self.terms.strained}
         attributes |= {f"yield_stress_{n}": y for n, y in limits.items() if np.isfinite(y)}
-        writer.put(group, axes, **attributes)
+        writer.put(group, {"along": planes.along, "depths": planes.depths}, **attributes)
         for moment, contact in self.moments.items():
             for number, body in contact.bodies.items():
                 assert body.section is not None
-                section = _section(body.section, contact.bulk)
+                section = {"stress": body.section, "von_mises": von_mises(body.section)}
                 writer.put(f"{group}/{moment}/body_{number}", section)
 
     def _write_life(self, writer: ResultsWriter, group: str) -> None:
         for moment, contact in self.moments.items():
-            writer.put(f"{group}/{moment}", {"left_out": Dataset(contact.left_out, "1", LEFT_OUT)})
+            writer.put(f"{group}/{moment}", {"left_out": contact.left_out})
             for number, body in contact.bodies.items():
-                on = On(f"grid/{self.name}")
-                writer.put(f"{group}/{moment}/body_{number}", body.maps, on)
+                writer.put(f"{group}/{moment}/body_{number}", body.maps)
         life = self.planes.settings.life
         attributes = {"parameter": life.parameter, "depth": life.depth, "bulk_stress": self.bulk}
         writer.put(group, {}, **attributes)
@@ -159,9 +151,7 @@ class InterfaceStress:
         numbers["left_out"] = {m: len(contact.left_out) for m, contact in self.moments.items()}
         parameter = self.planes.settings.life.parameter
         for name in RUIZ if parameter == "ruiz" else (parameter,):
-            numbers[name] = self._of_bodies(
-                lambda body, name=name: self._largest(body.maps[name].values)
-            )
+            numbers[name] = self._of_bodies(lambda body, name=name: self._largest(body.maps[name]))
         return numbers
 
     def _of_bodies(self, largest: Any) -> dict[str, Any]:
@@ -263,7 +253,7 @@ def _moment(
     return ContactMoment(stresses, carried, np.flatnonzero(~known))
 
 
-def life_maps(life: Life, stressed: Stressed, known: Mask) -> dict[str, Dataset]:
+def life_maps(life: Life, stressed: Stressed, known: Mask) -> dict[str, Array]:
     """Return maps of the parameter and its factors at the critical distance, by name.
 
     Stress is that of the ``known`` ``(t,)`` increments in all cycles of a mix; friction work is
@@ -271,25 +261,13 @@ def life_maps(life: Life, stressed: Stressed, known: Mask) -> dict[str, Dataset]
     """
     body, cycle, bulk = stressed
     if life.parameter == "ruiz":
-        tension = body.tension(cycle, bulk, life.depth, known)
-        return ruiz_maps(Ruiz(mean_work(cycle.tractions), tension), bulk is not None)
+        ruiz = Ruiz(mean_work(cycle.tractions), body.tension(cycle, bulk, life.depth, known))
+        return {
+            name: getattr(ruiz, name)
+            for name in ("friction_parameter", "tension", "cracking_parameter")
+        }
     history = body.history(cycle, bulk, life.depth, known)[known]
-    return plane_maps(life, history, body.material, bulk is not None)
-
-
-def _whose(bulk: bool) -> str:
-    """Return the origin of the stress, in words."""
-    alone = "under the contact's tractions alone"
-    return "of the contact and of what the structure carries past it" if bulk else alone
-
-
-def _section(stress: Array, bulk: bool) -> dict[str, Dataset]:
-    """Return the datasets of stress ``(6, n, k)`` in a section and its von Mises stress."""
-    what = f"xx, yy, zz, xy, yz, zx in the section at peak load, {_whose(bulk)}"
-    return {
-        "stress": Dataset(stress, "MPa", what),
-        "von_mises": Dataset(von_mises(stress), "MPa", "von Mises stress at peak load"),
-    }
+    return plane_maps(life, history, body.material)
 
 
 def mean_work(cycle: CycleTractions) -> Array:
@@ -297,39 +275,17 @@ def mean_work(cycle: CycleTractions) -> Array:
     return np.tensordot(cycle.loads.share, cycle.work, 1)
 
 
-def plane_maps(life: Life, history: Array, material: Material, bulk: bool) -> dict[str, Dataset]:
-    """Return maps of a critical-plane parameter for a stress ``history`` ``(t, 6, nx, ny)``.
-
-    ``bulk`` says whether the history includes the stress carried past the contact.
-    """
+def plane_maps(life: Life, history: Array, material: Material) -> dict[str, Array]:
+    """Return maps of a critical-plane parameter for a stress ``history`` ``(t, 6, nx, ny)``."""
     if life.parameter == "findley":
-        plane = findley(history, life.sensitivity)
-        what = "shear stress amplitude plus k largest normal stress, worst plane"
-        amplitude = "shear_amplitude", "MPa", "amplitude of the shear stress on the worst plane"
+        plane, amplitude = findley(history, life.sensitivity), "shear_amplitude"
     else:
-        plane = smith_watson_topper(history, material)
-        what = "largest normal stress times strain amplitude, worst plane"
-        amplitude = "strain_amplitude", "1", "amplitude of the normal strain on the worst plane"
-    name, unit, of_amplitude = amplitude
-    largest = f"largest normal stress over a cycle on the worst plane, {_whose(bulk)}"
-    normal = "unit normal of the worst plane, in the interface frame"
+        plane, amplitude = smith_watson_topper(history, material), "strain_amplitude"
     return {
-        life.parameter: Dataset(plane.value, "MPa", what),
-        name: Dataset(plane.amplitude, unit, of_amplitude),
-        "normal_stress": Dataset(plane.normal_stress, "MPa", largest),
-        "normal": Dataset(plane.normal, "1", normal),
-    }
-
-
-def ruiz_maps(parameters: Ruiz, bulk: bool) -> dict[str, Dataset]:
-    """Return maps of Ruiz's parameters, whose tension may include ``bulk`` stress."""
-    work = "Ruiz's F1: a quarter of the friction work of a cycle per area"
-    tension = f"largest tension along the surface over a cycle, {_whose(bulk)}"
-    cracking = "Ruiz's F2: F1 times tension"
-    return {
-        "friction_parameter": Dataset(parameters.friction_parameter, "N/mm", work),
-        "tension": Dataset(parameters.tension, "MPa", tension),
-        "cracking_parameter": Dataset(parameters.cracking_parameter, "N^2/mm^3", cracking),
+        life.parameter: plane.value,
+        amplitude: plane.amplitude,
+        "normal_stress": plane.normal_stress,
+        "normal": plane.normal,
     }
 
 

@@ -14,8 +14,7 @@ from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.store import read_arrays
-from workflow.shell.output.dataset import Dataset
-from workflow.shell.output.results import CurveAxis, ResultsWriter
+from workflow.shell.output.results import ResultsWriter
 
 # Group of the results, and dataset in the file of a jump.
 BOLTS, TENSION = "bolts", "bolts/tension"
@@ -55,18 +54,11 @@ class BoltTensions:
         kept = [read_arrays(folder.jump(jump))[0][TENSION] for jump in range(jumps)]
         kept.append(self.moments["worn"])  # on the last surfaces, whatever the coupling
         for number, name in enumerate(self.names):
-            over = "tension of the bolt in each increment, as far as it is meshed"
             cycles = {
-                f"tension_{moment}": Dataset(tensions[number], "N", f"{over}, {moment}")
-                for moment, tensions in self.moments.items()
+                f"tension_{moment}": tensions[number] for moment, tensions in self.moments.items()
             }
-            writer.put(f"{BOLTS}/{name}", cycles)
-            left = Dataset(
-                np.array([tensions[number, peak] for tensions in kept]),
-                "N",
-                "tension at peak load after each jump, as the loads were last solved",
-            )
-            writer.put(f"{BOLTS}/{name}", {"tension": left}, CurveAxis("kinetics/cycles"))
+            after_jumps = np.array([tensions[number, peak] for tensions in kept])
+            writer.put(f"{BOLTS}/{name}", cycles | {"tension": after_jumps})
 
     def summary(self) -> dict[str, Any]:
         """Return the tensions of each bolt by name; empty without bolts."""

@@ -16,10 +16,10 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.wear.case.loops import Loops
-from workflow.analyses.wear.output.loop_table import COLUMNS, SLIDES, LoopColumn, write_loop_table
+from workflow.analyses.wear.output.layout import OVER_ENERGY
+from workflow.analyses.wear.output.loop_table import COLUMNS, SLIDES, write_loop_table
 from workflow.models.loops import WornLoop
 from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.dataset import Dataset
 from workflow.shell.output.results import ResultsWriter
 from workflow.shell.terminal.reporter import Reporter
 
@@ -27,7 +27,6 @@ from workflow.shell.terminal.reporter import Reporter
 MEASURED = tuple(column.name for column in COLUMNS if column.name != "cycles")
 # Groups of a file above those of interfaces and jumps.
 LOOPS, LOOPS_OVER_ENERGY = "loops", "loops_over_energy"
-OVER_ENERGY = "energy", "kt", "kt_error", "mu", "mu_error"
 
 
 def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:
@@ -43,7 +42,7 @@ def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Arr
 # --- writing ------------------------------------------------------------------------------------
 
 
-def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int, per_length: bool) -> None:
+def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None:
     """Copy the loops of all jumps, 0 to ``jumps``, into the results: /loops/<interface>/<jump>.
 
     The measured values are also written against energy: /loops_over_energy/<interface>.
@@ -57,28 +56,13 @@ def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int, per_len
                 measured.setdefault(name, []).append(kept["values"][()].tolist())
     for name, rows in measured.items():
         columns = dict(zip(MEASURED, np.array(rows).T, strict=True))
-        over = {
-            column.name: Dataset(
-                columns[column.name], _unit(column, per_length), column.description
-            )
-            for column in COLUMNS
-            if column.name in OVER_ENERGY
-        }
-        writer.put(f"{LOOPS_OVER_ENERGY}/{name}", over)
-
-
-def _unit(column: LoopColumn, per_length: bool) -> str:
-    """Return the unit for the results writer, which adds "per mm" to energies, not stiffnesses."""
-    energy = column.name == "energy"
-    return "N mm" if energy else column.units(per_length)[0]
+        writer.put(
+            f"{LOOPS_OVER_ENERGY}/{name}", {column: columns[column] for column in OVER_ENERGY}
+        )
 
 
 def _write_loop(writer: ResultsWriter, place: str, kept: h5py.Group, cycles: float) -> None:
-    along = "of body 1 relative to body 2 along the axis, from the pressed state"
-    curve = {
-        "displacement": Dataset(kept["displacement"][()], "mm", along),
-        "force": Dataset(kept["force"][()], "N", "tangential force on body 2"),
-    }
+    curve = {name: kept[name][()] for name in ("displacement", "force")}
     values = dict(zip(MEASURED, kept["values"][()].tolist(), strict=True))
     writer.put(place, curve, **values, cycles=cycles)
 

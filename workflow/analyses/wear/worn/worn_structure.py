@@ -22,16 +22,16 @@ from sa_solver.transforms.threads import begun
 from sa_solver.types import Array, LoadHistory, Tally
 from wear.coupled import CoupledState
 from workflow.analyses.wear.budget.parts import ResultError
-from workflow.analyses.wear.budget.report import datasets_of, summary_of
+from workflow.analyses.wear.budget.report import arrays_of, summary_of
 from workflow.analyses.wear.output.datasets import put_face
 from workflow.analyses.wear.recording import reported_stage
 from workflow.analyses.wear.structures.resultants.writing import put_closure
 from workflow.analyses.wear.worn.bolts import BoltTensions
+from workflow.layout.declared import Arrays
 from workflow.models.contact import FaceContact
 from workflow.models.structure import StructureLoads
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.store import replacing
-from workflow.shell.output.dataset import Dataset
 from workflow.shell.output.results import ResultsWriter
 from workflow.shell.terminal.reporter import Reporter
 
@@ -102,7 +102,7 @@ class WornStructure:
                 mission = _mission(body, surface, self.shown)
                 writer.put(f"bodies/{body.name}/{moment}/mission", mission)
         for name, errors in self._errors().items():
-            writer.put(f"bodies/{name}/error", datasets_of(errors), accuracy=accuracy)
+            writer.put(f"bodies/{name}/error", arrays_of(errors), accuracy=accuracy)
 
     def summary(self, state: CoupledState) -> dict[str, Any]:
         """Return statistics of the solver and the largest stresses."""
@@ -240,35 +240,29 @@ def _peak(peak: PeakStress) -> dict[str, Any]:
     }
 
 
-def _body(body: Body, field: StressField) -> dict[str, Dataset]:
-    """Return the datasets of a body's mesh and stress."""
-    corners = "corner vertices of the tetrahedra, or of the triangles in the plane"
-    principal = "largest principal stress at peak load"
+def _body(body: Body, field: StressField) -> Arrays:
+    """Return a body's mesh and stress."""
+    fields = ("displacement", "stress", "von_mises", "maximum_principal")
     return {
-        "points": Dataset(body.points, "mm", "vertices, the faces of body 2 in their form"),
-        "elements": Dataset(body.mesh.t.T, "1", corners),
-        "displacement": Dataset(field.displacement, "mm", "displacement at peak load"),
-        "stress": Dataset(field.stress, "MPa", f"{GLOBAL_STRESS} at peak load"),
-        "von_mises": Dataset(field.von_mises, "MPa", "von Mises stress at peak load"),
-        "maximum_principal": Dataset(field.maximum_principal, "MPa", principal),
+        "points": body.points,
+        "elements": body.mesh.t.T,
+        **{name: getattr(field, name) for name in fields},
     }
 
 
-def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> dict[str, Dataset]:
-    """Return the datasets of a body's surface over the increments, in single precision."""
-    seen = "surface of the body, or of all of it in the plane"
-    largest = maximum_principal(surface.stress.swapaxes(0, 1))
-    equivalent = von_mises(surface.stress.swapaxes(0, 1))
+def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> Arrays:
+    """Return a body's surface over the increments, with fields in single precision."""
+    stress = surface.stress.swapaxes(0, 1)
     fields = {
-        "displacement": (surface.displacement, "mm", "displacement in each increment"),
-        "von_mises": (equivalent, "MPa", "von Mises stress in each increment"),
-        "maximum_principal": (largest, "MPa", "largest principal stress in each increment"),
+        "displacement": surface.displacement,
+        "von_mises": von_mises(stress),
+        "maximum_principal": maximum_principal(stress),
     }
     return {
-        "increments": Dataset(np.array(shown) + 1, "1", "increments, counted from 1"),
-        "points": Dataset(body.points[surface.vertices], "mm", f"vertices of the {seen}"),
-        "triangles": Dataset(surface.triangles, "1", f"triangles of the {seen}"),
-        **{name: Dataset(field.astype(np.float32), *of) for name, (field, *of) in fields.items()},
+        "increments": np.array(shown) + 1,
+        "points": body.points[surface.vertices],
+        "triangles": surface.triangles,
+        **{name: field.astype(np.float32) for name, field in fields.items()},
     }
 
 

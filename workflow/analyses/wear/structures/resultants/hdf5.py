@@ -27,8 +27,8 @@ from workflow.analyses.wear.structures.resultants.imported import (
 from workflow.case import units
 from workflow.case.files.input_files import InputFileError, open_hdf5
 from workflow.case.files.table_file import check_unit
-from workflow.shell.output.dataset import unit_in
-from workflow.shell.output.results import frame_of
+from workflow.layout.declared import unit_in
+from workflow.shell.output.results import frame_of, own
 
 LOADS = "load_history"
 # Datasets in a group in addition to the loads: those that are read, and others of our results.
@@ -120,7 +120,7 @@ def _check_counts(file: str, read: dict[str, ImportedLoads]) -> None:
 
 
 def _read(group: FileGroup, bounds: Bounds, line: bool) -> ImportedLoads:
-    for name in group.group:
+    for name in own(group.group):
         if name not in (LOADS, *NODAL, *IGNORED):
             raise group.error(name, "unknown", ", ".join((LOADS, *NODAL)))
     loads = _loads(FileGroup(group.file, group.group[LOADS]), bounds)
@@ -163,7 +163,7 @@ def _loads(group: FileGroup, bounds: Bounds) -> LoadHistory:
         present = ", ".join(group.group) or "nothing"
         allowed = f"all of them (Mx and My, or neither: held tilt); there is {present}"
         raise group.error("", f"{', '.join(missing)} missing", allowed)
-    for name in group.group:
+    for name in own(group.group):
         known = (*units_of, "sliding", *MIX)
         if name not in known:
             raise group.error(name, "unknown column", ", ".join(known))

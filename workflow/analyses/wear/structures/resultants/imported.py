@@ -9,8 +9,7 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import Face
 from sa_solver.types import Array, Frame, Indices, LoadHistory, Tilt
-from workflow.analyses.contact.output.datasets import LOADS
-from workflow.shell.output.dataset import unit_in
+from workflow.analyses.contact.output.layout import loads_over
 
 COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
 MOMENTS = ("Mx", "My")
@@ -66,7 +65,8 @@ class ImportedLoads:
 
 def base_units(line: bool) -> dict[str, str]:
     """Return the base unit of every column; per length in a line contact."""
-    return {name: unit_in(line, unit) for name, (unit, _) in LOADS.items() if name != "sliding"}
+    declared = loads_over("increment")
+    return {name: of.unit_in(line) for name, of in declared.items() if name != "sliding"}
 
 
 def required_columns(line: bool, given: Collection[str]) -> list[str]:

@@ -12,14 +12,30 @@ from numpy.typing import NDArray
 from fe_models.meshes.structure_mesh import Interface
 from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array, LoadHistory
-from workflow.analyses.contact.output.datasets import load_columns, slip_field
-from workflow.analyses.wear.output.datasets import face_mesh, nodal_solution
+from workflow.analyses.contact.output.layout import LOAD_HISTORY, load_columns
+from workflow.analyses.wear.output.datasets import mesh_of
+from workflow.analyses.wear.output.layout import FACE
 from workflow.analyses.wear.structures.resultants.consistency import MIX
 from workflow.analyses.wear.structures.resultants.imported import CLOSURE, base_units
-from workflow.shell.output.dataset import Dataset
+from workflow.layout.declared import CELLS, Arrays, Layout, over
 from workflow.shell.output.results import ResultsWriter, writing
 from workflow.shell.output.tables import heading, write_table
 
+LAYOUT = Layout(
+    {
+        "<face>": {
+            **FACE,
+            **over(CELLS, height=("mm", "gap before loading")),
+            **over(
+                "node",
+                nodes_1=("1", "node numbers of body 1"),
+                nodes_2=("1", "node numbers of body 2"),
+                nodal_height=("mm", "gap before loading, at the nodes"),
+            ),
+        },
+        "<face>/load_history": LOAD_HISTORY,
+    }
+)
 NOTE = "forces and moments of body 1 on body 2, in the frame of each interface"
 
 
@@ -70,18 +86,18 @@ def write_resultants_h5(
     ``cycle`` is the solution that the loads come from, if any.
     """
     line = any(history.interface.line for history in histories.values())
-    with writing(path, line) as writer:
+    with writing(path, LAYOUT, line) as writer:
         for name, history in histories.items():
             face = history.interface
             writer.put(f"{name}/load_history", load_columns(history.loads))
-            datasets = face_mesh(face) | {"slip": slip_field(history.slip)}
-            datasets |= nodal_solution(history.force, history.displacement)
+            solution = {"force": history.force, "displacement": history.displacement}
+            arrays = {**mesh_of(face), "slip": history.slip, **solution}
             if heights is not None:
-                datasets["height"] = Dataset(heights[name], "mm", "gap before loading")
+                arrays["height"] = heights[name]
             if isinstance(face, Interface):
-                datasets |= _at_nodes(face)
+                arrays |= _at_nodes(face)
             placed = {"origin": face.frame.origin, "axes": face.frame.axes}
-            writer.put(name, datasets, **placed, weighted=face.weighted or None)
+            writer.put(name, arrays, **placed, weighted=face.weighted or None)
             if cycle is not None:
                 put_closure(writer, name, cycle)
 
@@ -91,11 +107,7 @@ def put_closure(writer: ResultsWriter, group: str, cycle: CycleSolution) -> None
     writer.put(group, {}, cycles=cycle.cycles, **{CLOSURE: cycle.closure})
 
 
-def _at_nodes(face: Interface) -> dict[str, Dataset]:
+def _at_nodes(face: Interface) -> Arrays:
     """Return gap and node numbers at the face's nodes; those of body 1 only if meshes match."""
-    datasets = {
-        "nodes_1": Dataset(face.nodes_1, "1", "node numbers of body 1"),
-        "nodes_2": Dataset(face.nodes_2, "1", "node numbers of body 2"),
-        "nodal_height": Dataset(face.gap, "mm", "gap before loading, at the nodes"),
-    }
-    return {name: dataset for name, dataset in datasets.items() if len(dataset.values) == len(face)}
+    arrays = {"nodes_1": face.nodes_1, "nodes_2": face.nodes_2, "nodal_height": face.gap}
+    return {name: array for name, array in arrays.items() if len(array) == len(face)}

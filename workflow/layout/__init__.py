@@ -1,0 +1,1 @@
+"""Layout of results: what each dataset is, for models and analyses alike."""
