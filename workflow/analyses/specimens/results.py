@@ -46,7 +46,7 @@ FREQUENCIES = {
 }
 KINETICS = {
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle"),
-    "stick_stiffness": ("N/mm", "tangential stiffness with all that touches stuck"),
+    "stick_stiffness": ("N/mm", "tangential stiffness with all contact stuck"),
     "approach": ("mm", "motion of body 1 towards body 2"),
     "peak_pressure": ("MPa", "largest pressure"),
     "pressure_deviation": ("1", "root mean square of pressure/mean - 1 over the pad"),
@@ -104,7 +104,7 @@ def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
     with run_results(run, case, {"friction": case.friction.coefficient}) as writer:
         writer.put_contents(None)
         writer.put_grid(f"grid/{PAD}", outcome.half_space.grid, face.frame)
-        shares = {"area": Dataset(areas, "mm^2", "of contact that belongs to each node")}
+        shares = {"area": Dataset(areas, "mm^2", "contact area that belongs to each node")}
         writer.put("specimens/pad", face_mesh(face) | shares)
         for number, both in enumerate(outcome.model.reduction.frequencies, 1):
             writer.put(f"specimens/body_{number}", described(FREQUENCIES, both))

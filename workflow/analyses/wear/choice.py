@@ -70,7 +70,7 @@ def report_choice(
         for decision in record["decisions"]:
             reporter.say(f"chosen: {decision['entry']}: {decision['value']}: {decision['why']}")
         if record["met"]:
-            reporter.say(f"{error}, within every share; probes took {seconds:.1f} s")
+            reporter.say(f"{error}, every share met; probes took {seconds:.1f} s")
     if not record["met"]:
         missed = ", ".join(d["entry"] for d in record["decisions"] if not d["met"])
-        reporter.warn(f"{error}, not within every share: {missed}")
+        reporter.warn(f"{error}, shares not met: {missed}")

@@ -74,11 +74,12 @@ def decide_increments(
     error, settings = tried[-1][1], case.divided(counts)
     met = error <= allowed
     why = (
-        f"{' + '.join(map(str, counts))} in the legs of a cycle leave {100 * error:.2g} % of "
-        f"{100 * allowed:.2g} % allowed{'' if met else ', the most that are offered'}"
+        f"{' + '.join(map(str, counts))} in the legs of a cycle cause an error of "
+        f"{100 * error:.2g} %, of {100 * allowed:.2g} % "
+        f"allowed{'' if met else ', the most available'}"
     )
     if any(case.legs):
-        why += f"; the case's own {sum(case.legs)} leave {100 * cycle.error(case.legs):.2g} %"
+        why += f"; the {sum(case.legs)} of the case cause {100 * cycle.error(case.legs):.2g} %"
     known = [left if isfinite(left) else None for _, left in tried]
     probe = {"legs": [legs for legs, _ in tried], "errors": known}
     also = {entry: value for entry, value in settings.items() if entry != ENTRY}

@@ -239,9 +239,9 @@ def forces(file: h5py.File) -> Figure:
 
 
 def _forces_title(history: h5py.Group, energy: float) -> str:
-    text = f"{energy:.4g} {_in_millijoules(history)} dissipated in all"
+    text = f"{energy:.4g} {_in_millijoules(history)} dissipated in total"
     if history.attrs["method"] != "full":
-        text += "; only the turning points are computed"
+        text += "; only turning points are computed"
     return text
 
 

@@ -60,7 +60,7 @@ def lives_of_companions(
     def heard(told: Told, shares: Array) -> Lives:
         lives, rest, failures = told
         for part, error in failures:
-            reporter.log(f"error budget: {part} unknown, a short life failed: {error}")
+            reporter.log(f"error budget: {part} unknown, because a probe run failed: {error}")
         if "coupling" in lives:
             lives["coupling"] = scaled(lives["coupling"], late(rest, shares))
         return lives

@@ -28,8 +28,8 @@ def summary_of(errors: Mapping[str, ResultError]) -> dict[str, Any]:
 def datasets_of(errors: Mapping[str, ResultError]) -> dict[str, Dataset]:
     """Return each result's parts in the order of ``PARTS``, nan if unknown, and their total."""
     what = (
-        f"estimated relative errors by {', '.join(PARTS)}, above 0 where too much is told, and "
-        "their total"
+        f"estimated relative errors by {', '.join(PARTS)}, above 0 where a result is too large, "
+        "and their total"
     )
     return {
         name: Dataset(
@@ -60,7 +60,7 @@ def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
         if part and abs(part) >= WORTH_TELLING * error.total
     ]
     unknown = dict.fromkeys(name for error in errors.values() for name in error.unknown)
-    largest = f"most of {RESULTS[worst]}: {', '.join(parts)}" if parts else ""
+    largest = f"largest parts for {RESULTS[worst]}: {', '.join(parts)}" if parts else ""
     missing = f"unknown: {', '.join(unknown)}" if unknown else ""
     if largest or missing:
         yield "; ".join(filter(None, (largest, missing)))
@@ -84,6 +84,6 @@ def warning_of(
     listed = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in beyond.items())
     asked = f"{100.0 * accuracy:g} % ({AT_EDGES:g} times that at worn edges)"
     return (
-        f"{name}: estimated errors beyond the accuracy of {asked}: {listed}; mostly by {most}: "
-        f"{settings[most]}"
+        f"{name}: estimated errors exceed the accuracy of {asked}: {listed}; mainly due to "
+        f"{most}: {settings[most]}"
     )

@@ -51,9 +51,9 @@ def warn_of_errors(
         fewest = min(mission.stop - mission.start for mission in state.loads.missions)
         if len(state.paths) and fewest < FEW_INCREMENTS:
             reporter.warn(
-                f"{name}: the bodies move over each other in {fewest} increments a cycle: they "
-                "wear edges into each other at which the worn peak pressure is too large, by a "
-                f"fifth with 16 and more with fewer; take {FEW_INCREMENTS}"
+                f"{name}: the bodies move over each other in only {fewest} increments per cycle "
+                "and wear false edges into each other: the worn peak pressure is too large, by a "
+                f"fifth with 16 increments and more with fewer; take {FEW_INCREMENTS}"
             )
 
 
@@ -108,12 +108,12 @@ def _warn_of_steps(
         asked = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
     if wear.step.automatic and error > asked:
         reporter.warn(
-            f"{name}: wear steps leave an estimated error of {error:.2%} of depth and volume "
-            f"where {asked:.2%} was asked for (wear.tolerance): take shorter steps ({shorter})"
+            f"{name}: wear steps cause an estimated error of {error:.2%} of depth and volume, "
+            f"above wear.tolerance ({asked:.2%}): take shorter steps ({shorter})"
         )
     if left["pressure"] > PEAK:
         reporter.warn(
-            f"{name}: wear steps leave an estimated error of {left['pressure']:.0%} of the "
-            "peak pressure on the worn surfaces, and of what follows from it (fretting life): "
-            f"take shorter steps ({shorter})"
+            f"{name}: wear steps cause an estimated error of {left['pressure']:.0%} of the worn "
+            "peak pressure and of what follows from it (fretting life): take shorter steps "
+            f"({shorter})"
         )

@@ -95,14 +95,16 @@ class Uniformity:
     def sentence(self, name: str) -> str:
         """Return a sentence for the log."""
         text = (
-            f"{name}: sections alike within {ALIKE:.0%} over the middle "
+            f"{name}: sections differ by less than {ALIKE:.0%} over the middle "
             f"{self.share_of_length_within:.0%} of the length"
         )
         if not self.uniform:
-            return f"{text}: too uneven for two dimensions"
+            return f"{text}: too uneven for a model in two dimensions"
         extra = self.mean_load - 1.0
         more = "more" if extra >= 0.0 else "less"
-        return f"{text}: two dimensions give the middle, with {abs(extra):.1%} {more} load"
+        return (
+            f"{text}: a model in two dimensions gives the middle, with {abs(extra):.1%} {more} load"
+        )
 
 
 def uniformities(

@@ -135,7 +135,7 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
         climbs.append(_climb_grid(along, most, part, lambda rung: end_life(section, rung.size)))
         along = climbs[-1].taken.size
     grid = climbs[0].taken.size, along
-    named = dict(zip(("strips across the flank", "strips along the slot"), climbs, strict=False))
+    named = dict(zip(("cells across the flank", "cells along the slot"), climbs, strict=False))
     why = "; ".join(_sentence(climb, part, name) for name, climb in named.items())
     probe = {name: climb.probed for name, climb in named.items()}
     error = sum(climb.error for climb in climbs)
@@ -183,8 +183,10 @@ def _climb(rungs: Sequence[_Rung], worn: Callable[[_Rung], Numbers], allowed: fl
 
 
 def _sentence(climb: _Climb, allowed: float, unit: str) -> str:
-    text = f"{climb.taken.size} {unit} leave {climb.error:.2%} of {allowed:.2%} allowed"
-    beyond = "" if climb.error <= allowed else ", the finest that is offered"
+    text = (
+        f"{climb.taken.size} {unit} cause an error of {climb.error:.2%}, of {allowed:.2%} allowed"
+    )
+    beyond = "" if climb.error <= allowed else ", the finest available"
     return f"{text} ({climb.worst}){beyond}"
 
 
@@ -194,7 +196,7 @@ def _sentence(climb: _Climb, allowed: float, unit: str) -> str:
 def choose_tolerance(case: DovetailCase, allowed: float) -> Decision:
     """Choose the share of the error as tolerance of the contact solver, whose error is smaller."""
     tolerance = max(min(allowed, LOOSEST_TOLERANCE), 1e-12)
-    why = "its share: depth and volume were found within half of it"
+    why = "its share of the error: depth and volume were within half of it"
     error = LEFT_BY_TOLERANCE * tolerance
     return _decision({"contact.tolerance": tolerance}, why, {}, allowed, error)
 
@@ -208,7 +210,7 @@ def choose_steps(case: DovetailCase, allowed: float) -> Decision:
         "wear.step.kind": "implicit",
         **{f"wear.step.{size}": None for size in SIZES},
     }
-    why = "its share, for automatic implicit steps"
+    why = "its share of the error, for automatic implicit steps"
     return _decision(settings, why, {}, allowed, tolerance)
 
 
@@ -216,7 +218,7 @@ def choose_drift(case: DovetailCase, allowed: float) -> Decision:
     """Choose the drift at which coupled and uncoupled probe runs would differ by the share."""
     coupling = case.coupling
     if coupling.resultants == "constant":
-        why = "resultants stay those of the unworn structure, as the case has it"
+        why = "resultants stay those of the unworn structure, as the case says"
         return Decision("coupling.drift", coupling.drift, why)
     section = plane_section(case)
     apart = life(section)

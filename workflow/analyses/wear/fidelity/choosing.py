@@ -43,7 +43,7 @@ def _decide(axis: FidelityAxis, case: DovetailCase, allowed: float) -> Decision:
     try:
         decision = axis.decide(case, allowed)
     except FAILURES as error:
-        why = f"as the case has it: the probe failed: {error}"
+        why = f"as the case says, because the probe failed: {error}"
         written = attrgetter(axis.entry)(case)
         decision = Decision(axis.entry, written, why, allowed=allowed, met=False)
     return replace(decision, seconds=since(begin))

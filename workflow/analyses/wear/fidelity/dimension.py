@@ -34,7 +34,7 @@ def choose_dimension(case: DovetailCase) -> Decision:
     proportional to that energy.
     """
     if case.structure.skew != 0.0:
-        return Decision(ENTRY, 3, "a skewed slot is not the same all along")
+        return Decision(ENTRY, 3, "the sections of a skewed slot differ")
     try:
         values = {dimension: _mid_slot(case, dimension) for dimension in (2, 3)}
     except (MeshError, MethodFailed) as error:
@@ -47,9 +47,9 @@ def choose_dimension(case: DovetailCase) -> Decision:
     largest = named[flank, quantity]
     probe = {"two": values[2], "three": values[3], "differences": differences}
     text = (
-        f"in a coarse probe of mid-slot two dimensions differ from three by at most {largest:.1%} "
-        f"({quantity} on the {flank}); allowed: {MOST_USED * case.accuracy:.1%}; "
-        "the ends of the slot, which may wear more, are left out"
+        "in a coarse probe of mid-slot, two dimensions differ from three by at most "
+        f"{largest:.1%} ({quantity} on the {flank}); allowed: {MOST_USED * case.accuracy:.1%}; "
+        "the ends of the slot, which may wear more, are not included"
     )
     allowed = MOST_USED * case.accuracy
     dimension, used = (3, 0.0) if largest > allowed else (2, largest)

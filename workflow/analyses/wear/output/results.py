@@ -394,7 +394,7 @@ def _lines(outcome: Outcome, summary: dict[str, Any], budget: Budget) -> Iterato
         yield f"  {name}: peak pressure {pressures}; tilt {numbers['tilt']}"
         if contact.stopped is not None:
             yield (
-                f"  {name}: wear has stopped to within {STOPPED:.0%} of depth and volume after "
+                f"  {name}: wear stopped (depth and volume within {STOPPED:.0%}) after "
                 f"{contact.stopped:.3g} cycles"
             )
         yield from (f"  {name}: {told}" for told in sentences(budget[name]))

@@ -55,9 +55,9 @@ def choose_parts(case: AnyCase) -> tuple[AnyCase, dict[str, Any] | None]:
     if not np.isfinite(error) or (parts == 1 and error <= accuracy):
         return case, None
     why = (
-        f"{parts * rows} in a cycle leave {error:.2%} of the depth and energy of the unworn "
-        f"cycle, of {accuracy:.2%} allowed (contact.accuracy); the case's own {rows} leave "
-        f"{tried[1]:.2%}"
+        f"{parts * rows} in a cycle cause an error of {error:.2%} of depth and energy of the "
+        f"unworn cycle, of {accuracy:.2%} allowed (contact.accuracy); the {rows} of the case "
+        f"cause {tried[1]:.2%}"
     )
     (entry, value), *also = _divided(case, parts).items()
     probe = {
