@@ -97,7 +97,7 @@ def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Re
     share = float(waves / history.pressure[stage.peak].max())
     if share > FORM_SHARE:
         reporter.warn(
-            f"{face.name}: the form of its faces is uncertain by {1000.0 * unsure:.2g} µm, as the "
+            f"{face.name}: the form of its faces is uncertain by {1e3 * unsure:.2g} µm, as the "
             f"mesh has only corner nodes; the peak pressure may be wrong by {share:.0%}: give the "
             "bodies as CAD, or with midside nodes"
         )

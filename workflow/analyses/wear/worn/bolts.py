@@ -55,7 +55,7 @@ class BoltTensions:
         kept = [read_arrays(folder.jump(jump))[0][TENSION] for jump in range(jumps)]
         kept.append(self.moments["worn"])  # on the last surfaces, whatever the coupling
         for number, name in enumerate(self.names):
-            over = "tension of the bolt in each increment, as far as it is meshed"
+            over = "tension of the bolt in each increment, of its meshed part"
             cycles = {
                 f"tension_{moment}": Dataset(tensions[number], "N", f"{over}, {moment}")
                 for moment, tensions in self.moments.items()
@@ -64,7 +64,7 @@ class BoltTensions:
             left = Dataset(
                 np.array([tensions[number, peak] for tensions in kept]),
                 "N",
-                "tension at peak load after each jump, as the loads were last solved",
+                "tension at peak load after each jump, as last solved",
             )
             writer.put(f"{BOLTS}/{name}", {"tension": left}, CurveAxis("kinetics/cycles"))
 

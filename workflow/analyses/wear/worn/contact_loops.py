@@ -102,8 +102,8 @@ def warn_of_border(loops: dict[str, dict[str, Any]], asked: Loops, reporter: Rep
         share = max(loop[when]["border_load"] for when in ("unworn", "worn"))
         if share > 0.0 and asked.normal_force is not None:
             reporter.warn(
-                f"{name}: in the tangential loops the contact reaches the border of its grid "
-                f"({share:.1%} of the force): lower loops.normal_force"
+                f"{name}: in the tangential loops the contact reaches the border of its grid, "
+                f"which carries {share:.1%} of the force: lower loops.normal_force"
             )
 
 

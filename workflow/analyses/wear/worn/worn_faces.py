@@ -42,8 +42,9 @@ def write_worn_faces(
             write_worn_nodes(path, face.numbers, displacement)
             if worn.volume_share < FULL_SHARE:
                 reporter.warn(
-                    f"{stage.name}, body_{face.body}: the nodes carry {worn.volume_share:.1%} of "
-                    "the worn volume: the rest lies outside their face"
+                    f"{stage.name}, body_{face.body}: the nodes carry only "
+                    f"{worn.volume_share:.1%} of the worn volume, as the rest lies outside their "
+                    "face"
                 )
             summary.setdefault(stage.name, {})[f"body_{face.body}"] = {
                 "file": name,
