@@ -50,8 +50,8 @@ DECAYED = 0.9
 RING_DOWN_POINTS = 400
 # Reason why a ring-down has no damping, and the result to use instead.
 TOO_SHORT = (
-    "the motion has faded before the filter that follows its first mode has settled, so neither "
-    "damping nor frequency over the amplitude is told; the frequency response is"
+    "the motion fades before the filter around its first mode settles, so damping and frequency "
+    "against amplitude are not known; the frequency response is"
 )
 
 
@@ -93,8 +93,8 @@ def _state(
     response = frequency_response(blow.value(motion.times), acceleration, step)
     if response.remaining > AT_REST:
         reporter.warn(
-            f"at {joules(energy)} {response.remaining:.0%} of the response is left when the record "
-            "ends, which blurs its peaks: raise excitation.record"
+            f"at {joules(energy)} the record ends with {response.remaining:.0%} of the response "
+            "left, which blurs its peaks: raise excitation.record"
         )
     peaks = _peak("first", response, *hammer.band, energy)
     if rig.in_a_row and len(bounds["stuck"]) > 1:
@@ -123,11 +123,11 @@ def _state(
 
 def _response(frequency: Array, value: NDArray[np.complex128]) -> dict[str, Dataset]:
     """Return datasets of a frequency response ``(n,)``."""
-    size = "acceleration of what is looked at, over the excitation"
+    size = "acceleration of the reported point over the excitation"
     return {
         "frequency": Dataset(frequency, "Hz", "frequency"),
         "magnitude": Dataset(np.abs(value), "mm/(s^2 N)", size),
-        "phase": Dataset(np.angle(value), "rad", "of the acceleration before the excitation"),
+        "phase": Dataset(np.angle(value), "rad", "phase of the acceleration to the excitation"),
     }
 
 
@@ -176,7 +176,7 @@ def _ring_down(
         reporter.warn(f"no ring-down at {joules(energy)}: {TOO_SHORT}")
         return None
     kept = np.unique(np.linspace(0, len(amplitude) - 1, RING_DOWN_POINTS).astype(int))
-    size = "amplitude of what is looked at, in its first mode"
+    size = "amplitude of the reported point, in its first mode"
     return {
         "amplitude": Dataset(amplitude[kept], "mm", size),
         "frequency": Dataset(decay.frequency[kept], "Hz", "instantaneous frequency"),

@@ -55,7 +55,7 @@ def warn_of_steps(energy: float, error: float, reporter: Reporter) -> None:
     """Warn where the time steps cause a large error of a motion at an ``energy`` [N mm]."""
     if error > STEPS_LEAVE:
         reporter.warn(
-            f"at {joules(energy)} the steps of time leave an error of {error:.1%} of the largest "
+            f"at {joules(energy)} the time steps cause an error of {error:.1%} of the largest "
             "displacement: lower integration.step"
         )
 
@@ -88,9 +88,11 @@ def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict
     return {
         "time": Dataset(motion.times, "s", "time"),
         "excitation": Dataset(force.value(motion.times), "N", "force of the excitation"),
-        "displacement": Dataset(motion.displacement @ seen, "mm", "displacements of what is seen"),
+        "displacement": Dataset(
+            motion.displacement @ seen, "mm", "displacements of the reported points"
+        ),
         "acceleration": Dataset(
-            motion.acceleration @ seen, "mm/s^2", "accelerations of what is seen"
+            motion.acceleration @ seen, "mm/s^2", "accelerations of the reported points"
         ),
         "joint_force": Dataset(rig.loop(motion)[1], "N", pull),
         **of_entries,
