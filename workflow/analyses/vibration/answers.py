@@ -98,7 +98,7 @@ def _message(branch: ResponseBranch, frequency: float, found: tuple[HarmonicSolu
     if found:
         return ""
     low, high = branch.frequencies.min(), branch.frequencies.max()
-    return f"none: the curve, from {low:.6g} to {high:.6g} Hz, ends before"
+    return f"none: the curve from {low:.6g} to {high:.6g} Hz does not reach it"
 
 
 def _numbers(
@@ -125,9 +125,11 @@ def _table(
     errors = np.array([motion.error.largest for motion in motions if motion.error is not None])
     amplitude = columns["amplitude"].values.reshape(-1, len(model.rig.seen))
     seen = Dataset(amplitude, "mm", columns["amplitude"].description)
-    said = "of the joints' vibration or the energy lost, by harmonics and samples"
+    said = "of the joints' vibration or the energy lost, due to harmonics and samples"
     return {
-        "frequency": Dataset(frequency, "Hz", "of the force; motions in the order of the curve"),
+        "frequency": Dataset(
+            frequency, "Hz", "frequency of the force; motions in the order of the curve"
+        ),
         "amplitude": seen,
         **{name: columns[name] for name in GROUND if name in columns},
         **{name: columns[name] for name in TOLD},

@@ -88,7 +88,7 @@ class VibrationModel:
         rest = self.problem.solve(1.0, 0.0)
         if not rest.converged:
             raise MethodFailed(
-                "the joints do not balance the static load; change normal_load or "
+                "the joints do not balance the static load: change normal_load or "
                 f"normal_stiffness of the joint ({rest.message})"
             )
         return rest
@@ -162,11 +162,11 @@ class VibrationModel:
             return None
         force, closing = self.rest.cycle.samples[0, :, 2], self.rest.coefficients[:, 0, 2]
         return {
-            "x": Dataset(rig.places[:, 0], "mm", "of each joint on the contact plane"),
-            "y": Dataset(rig.places[:, 1], "mm", "of each joint on the contact plane"),
-            "gap": Dataset(rig.gap, "mm", "of the bodies without load"),
-            "area": Dataset(rig.area, "mm^2", "that belongs to each joint"),
-            "normal_force": Dataset(force, "N", "of each joint at rest"),
+            "x": Dataset(rig.places[:, 0], "mm", "place of each joint on the contact plane"),
+            "y": Dataset(rig.places[:, 1], "mm", "place of each joint on the contact plane"),
+            "gap": Dataset(rig.gap, "mm", "gap of the bodies without load"),
+            "area": Dataset(rig.area, "mm^2", "area that belongs to each joint"),
+            "normal_force": Dataset(force, "N", "gap of each joint at rest"),
             "normal_displacement": Dataset(
                 closing, "mm", "closing of each joint by the load at rest"
             ),
@@ -190,7 +190,7 @@ class VibrationModel:
         amount = self.driving.amount
         unit, _ = amount.receptance
         first = "" if amount is FORCE else ", of harmonic 1"
-        size = f"amplitude of what is looked at over the {amount.name}{first}"
+        size = f"amplitude of the reported point over the {amount.name}{first}"
         return {
             "frequency": Dataset(frequency, "Hz", "frequency of the force"),
             "free": Dataset(free, unit, f"{size}, without the joints"),

@@ -59,8 +59,8 @@ def mode_of(
     if moved <= STILL * np.abs(linear.shape).max():
         raise MethodFailed(
             f"modes: mode {number}, at {linear.frequency:.4g} Hz, does not move "
-            f"{model.rig.labels[-1]}, whose amplitude counts; look at another place, or leave the "
-            "mode out"
+            f"{model.rig.labels[-1]}, by which amplitudes are measured: report another point, or "
+            "leave the mode out"
         )
     # Convert observed amplitudes to modal ones, by the shape of the linear mode.
     least, largest = (amplitude / moved for amplitude in case.modes.amplitudes)
@@ -102,11 +102,11 @@ def _columns(model: VibrationModel, motions: tuple[ModeMotion, ...]) -> dict[str
         return Dataset(np.array(values), unit, what)
 
     solutions = [motion.solution for motion in motions]
-    seen = "half of the way to and fro of what is looked at, in the order of the curve"
+    seen = "half the peak-to-peak motion of the reported point, in the order of the curve"
     norm = "amplitude of the mode: norm of harmonic 1 by the mass"
-    fed = "of the mode, as a share of what is critical: energy lost over 2ω ∫ x'ᵀ M x' dt"
+    fed = "damping ratio of the mode: energy lost over 2ω ∫ x'ᵀ M x' dt"
     slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
-    richer = "estimated error by harmonics and samples"
+    richer = "estimated error due to harmonics and samples"
     return {
         "amplitude": column([float(amplitudes_of(model, s)[-1]) for s in solutions], "mm", seen),
         "modal_amplitude": column([motion.amplitude for motion in motions], "t^0.5 mm", norm),

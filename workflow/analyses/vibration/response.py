@@ -54,7 +54,7 @@ LARGEST_ERROR = 0.05
 # weighs as much as this known share of the curve in predictions.
 POINTS, BEGUN = 50, 0.2
 # Reason why a curve may end at a resonance.
-UNBOUNDED = "; without damping what the joints do not hold back has no bound at resonance"
+UNBOUNDED = "; without damping, resonances at which the joints do not resist are unbounded"
 
 
 def step_control(
@@ -252,7 +252,7 @@ def backbone_of(
         steps,
     )
     columns = motion_columns(model, backbone.problem, backbone.solutions)
-    resonance = "of phase resonance: what is driven lags the force by 90 degrees"
+    resonance = "phase resonance: the driven point lags the force by 90 degrees"
     datasets = {
         case.amount.name: Dataset(backbone.forces, case.amount.unit, case.amount.description),
         "frequency": Dataset(backbone.frequencies, "Hz", resonance),
@@ -325,7 +325,7 @@ def curves_of(
 def _of_the_last(amplitudes: Dataset) -> Dataset:
     """Return the main observed amplitude ``(n,)`` of all observed ones ``(n, k)``."""
     last = amplitudes.values[:, -1]
-    return Dataset(last, "mm", "half of the way to and fro of what is looked at")
+    return Dataset(last, "mm", "half the peak-to-peak motion of the reported point")
 
 
 def motion_columns(
@@ -337,17 +337,17 @@ def motion_columns(
         return Dataset(np.array([of(motion) for motion in motions]), unit, what)
 
     moving = bool(model.driving.ground)
-    seen = "half of the way to and fro of what is seen, the last looked at"
+    seen = "half the peak-to-peak motion of the reported points, the last being the main one"
     relative = f"{seen}, relative to the moving ground" if moving else seen
-    lag = "of harmonic 1 of what is looked at before the force, or before a sine at t = 0"
+    lag = "phase by which harmonic 1 of the reported point leads the force, or a sine at t = 0"
     lost = "energy lost in a cycle over 4π times the largest kinetic energy"
     slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
-    apart = "share of the cycle in which they are apart"
-    beyond = "estimated share of the joints' vibration in harmonics left out"
+    apart = "share of the cycle in which they are open"
+    beyond = "estimated share of the joints' vibration in harmonics that are not included"
     energy = "energy that the joints dissipate in a cycle"
     absolute = {}
     if moving:
-        of_all = f"{seen}, that of the ground included"
+        of_all = f"{seen}, including that of the ground"
         absolute["absolute_amplitude"] = column(
             lambda motion: amplitudes_of(model, model.driving.absolute(motion)), "mm", of_all
         )
@@ -389,7 +389,7 @@ def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
     share = "share of the cycle in which each joint"
     return {
         "slip": Dataset(slip, "1", f"{share} slips, by point of the curve"),
-        "separated": Dataset(separated, "1", f"{share} is apart"),
+        "separated": Dataset(separated, "1", f"{share} is open"),
         "energy": Dataset(energy, "N mm", "energy that each joint dissipates in a cycle"),
     }
 
@@ -403,7 +403,7 @@ def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
     return {
         "displacement": Dataset(displacement, "mm", moved),
         "force": Dataset(solution.cycle.samples, "N", pulled),
-        "state": Dataset(states, "1", "of each joint: 0 sticks, 1 slips, 2 is apart"),
+        "state": Dataset(states, "1", "state of each joint: 0 sticks, 1 slips, 2 is open"),
     }
 
 
@@ -420,8 +420,8 @@ def warn_of_stroke(
     )
     if stroke > LARGE_STROKE * width:
         reporter.warn(
-            f"{told} the pads slide over each other by {stroke:.3g} mm, "
-            f"more than {LARGE_STROKE:.0%} of their width: that other nodes meet is neglected"
+            f"{told} the pads slide over each other by {stroke:.3g} mm, more than "
+            f"{LARGE_STROKE:.0%} of their width: the result neglects that other nodes then meet"
         )
 
 

@@ -110,14 +110,14 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
 def _tell_what_is_left_out(case: VibrationCase, model: VibrationModel, reporter: Reporter) -> None:
     """Report the parts of records that are left out, and stability that is not computed."""
     for number, share in enumerate(model.driving.left_out):
-        reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic left out")
+        reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic is not used")
         if share > LEFT_OUT:
             reporter.warn(
                 f"excitation.records.{number}: {share:.1%} of its force is above the highest "
-                "harmonic taken and left out: raise highest, or resolution.harmonics"
+                "harmonic used and is lost: raise highest, or resolution.harmonics"
             )
     if case.stability == "auto" and not looked_for(case, model):
-        reporter.say("stability: not looked for in so large a structure; `stability: every` does")
+        reporter.say("stability: not computed in so large a structure; `stability: every` does it")
 
 
 @dataclass

@@ -83,7 +83,7 @@ def stability_along(
     _warn_of_folds(name, bifurcations, reporter)
     unknown = [at for at in known if at.verdict == "unknown"]
     if len(unknown) == len(known) and known:
-        reporter.warn(f"{name}: nothing is said of stability: {unknown[0].message}")
+        reporter.warn(f"{name}: stability is not known: {unknown[0].message}")
     numbers: dict[str, Any] = {
         "unstable_points": sum(at.verdict == "unstable" for at in known),
         "unknown_points": len(unknown),
@@ -107,8 +107,8 @@ def _warn_of_folds(
         multiplier = each["multiplier"] * np.exp(1j * each["multiplier_angle"])
         if abs(multiplier - 1.0) > AWAY:
             reporter.warn(
-                f"{name}: the fold at {each['frequency']:.4g} Hz is none of the motion itself, of "
-                f"which no multiplier is near 1 there ({multiplier:.2g}): give more "
+                f"{name}: the fold at {each['frequency']:.4g} Hz is not one of the motion itself, "
+                f"as no multiplier is near 1 there ({multiplier:.2g}): give more "
                 "resolution.harmonics and resolution.samples"
             )
 
@@ -127,7 +127,7 @@ def _columns(known: Sequence[Stability]) -> dict[str, Dataset]:
         return columns
     largest, error = np.array([(at.largest, at.error) for at in known]).T
     unstable = np.array([at.unstable for at in known])
-    unknown = "NaN where it is not known"
+    unknown = "NaN where unknown"
     return columns | {
         "multiplier": Dataset(
             np.where(resolved, largest, np.nan),
@@ -137,9 +137,11 @@ def _columns(known: Sequence[Stability]) -> dict[str, Dataset]:
         "multiplier_error": Dataset(
             np.where(resolved, error, np.nan),
             "1",
-            f"estimated, of the largest multiplier, {unknown}",
+            f"estimated error of the largest multiplier, {unknown}",
         ),
-        "unstable_multipliers": Dataset(unstable, "1", f"multipliers {of} beyond 1, surely"),
+        "unstable_multipliers": Dataset(
+            unstable, "1", f"number of multipliers {of} certainly beyond 1"
+        ),
     }
 
 
@@ -165,10 +167,13 @@ def columns_for(amount: ExcitationSize) -> dict[str, tuple[str, str]]:
     return {
         "frequency": ("Hz", "of the force"),
         amount.name: (amount.unit, amount.description),
-        "amplitude": ("mm", "half of the way to and fro of what is looked at"),
+        "amplitude": ("mm", "half the peak-to-peak motion of the reported point"),
         "multiplier": ("1", "size of the one that passes the circle there"),
         "multiplier_angle": ("rad", "its angle: 0 of a fold, pi where the period doubles"),
-        "unstable_before": ("1", "multipliers beyond the circle before, NaN where not known"),
+        "unstable_before": (
+            "1",
+            "number of multipliers beyond the circle before, NaN where unknown",
+        ),
         "unstable_after": ("1", "and at the point after"),
     }
 

@@ -155,8 +155,8 @@ class _Description:
         width = float(np.count_nonzero(pressed)) * self.contact.grid.pitch[0]
         if cycle.stroke > LARGE_STROKE * width:
             self.reporter.warn(
-                f"the stroke is more than {LARGE_STROKE:.0%} of the contact's width: that the "
-                "surfaces move over each other is neglected"
+                f"the stroke exceeds {LARGE_STROKE:.0%} of the contact's width: the result "
+                "neglects that the surfaces move over each other"
             )
 
 
@@ -175,7 +175,9 @@ def _fields(cycle: ContactCycle, loop: TangentialLoop) -> dict[str, dict[str, Da
         SLIDERS: _slider_fields(cycle),
         LOOP: wearing_loop(closed(cycle.displacement), closed(cycle.motion.cycle.samples[:, 0, 0])),
         HALF_SPACE: {
-            "displacement": Dataset(displacement, "mm", "of the bodies, as far to and fro"),
+            "displacement": Dataset(
+                displacement, "mm", "displacement of the bodies, with the same amplitude"
+            ),
             "force": Dataset(force, "N", pull),
         },
     }
@@ -192,7 +194,7 @@ def _contact_fields(cycle: ContactCycle) -> dict[str, Dataset]:
         **depth_fields(surfaces.depth_1, surfaces.depth_2),
         "onset": Dataset(cycle.friction * cycle.slipping.onset, "mm", sticks),
         "path": path_field(cycle.path),
-        "energy": Dataset(cycle.energy, "N/mm", "per area, in such a cycle"),
+        "energy": Dataset(cycle.energy, "N/mm", "energy dissipated per area in such a cycle"),
     }
 
 
@@ -200,10 +202,10 @@ def _slider_fields(cycle: ContactCycle) -> dict[str, Dataset]:
     """Return the sliders that represent the contact in the rig, ``(n,)`` each."""
     slipping = cycle.slipping
     reach = cycle.friction * slipping.reach
-    lost = "that it dissipates in a cycle under the force that wears"
+    lost = "energy dissipated in a cycle under the force that wears"
     return {
-        "reach": Dataset(reach, "mm", "motion at which each slider gives way"),
-        "stiffness": Dataset(slipping.slider_stiffness, "N/mm", "of its spring"),
-        "normal_load": Dataset(slipping.slider_load, "N", "that presses it"),
+        "reach": Dataset(reach, "mm", "motion at which each slider slips"),
+        "stiffness": Dataset(slipping.slider_stiffness, "N/mm", "stiffness of its spring"),
+        "normal_load": Dataset(slipping.slider_load, "N", "normal load that presses it"),
         "energy": Dataset(cycle.by_slider, "N mm", lost),
     }

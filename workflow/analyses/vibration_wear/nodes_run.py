@@ -67,9 +67,10 @@ def wear_nodes(
         worn = _worn_state(case.unworn, pads.at(state), state, reached, reporter, steps)
         if worn.numbers["step_error"] > wear.tolerance:
             reporter.warn(
-                f"{cycles:g} cycles: wear steps leave an error of {worn.numbers['step_error']:.2g} "
-                f"of depth or volume, above wear.tolerance {wear.tolerance:g}: lower it, or raise "
-                "resolution.samples or resolution.harmonics"
+                f"{cycles:g} cycles: wear steps cause an error of "
+                f"{worn.numbers['step_error']:.2g} of depth or volume, above wear.tolerance "
+                f"{wear.tolerance:g}: lower it, or raise resolution.samples or "
+                "resolution.harmonics"
             )
         return worn
 
@@ -109,11 +110,13 @@ def resonance_that_wears(case: NodesWearCase, problem: HarmonicBalance) -> Harmo
 
 def _nodes(rig: RigModel) -> WornNodes:
     """Return the places of the contacts, as far as they are known."""
-    area = {"area": Dataset(rig.area, "mm^2", "that belongs to each node")}
+    area = {"area": Dataset(rig.area, "mm^2", "area that belongs to each node")}
     nodes = rig.nodes
     if nodes is None:
-        return WornNodes(_on_plane(rig, "of each node on the contact plane") | area)
-    bodies = {"normal": Dataset(nodes.normals, "1", "out of body 1, what the joints' points meet")}
+        return WornNodes(_on_plane(rig, "place of each node on the contact plane") | area)
+    bodies = {
+        "normal": Dataset(nodes.normals, "1", "out of body 1, at the other side of the joints")
+    }
     if nodes.places is not None:
         bodies[POSITION] = Dataset(nodes.places, "mm", "of each node, x, y, z")
         if len(rig.places):
@@ -174,7 +177,7 @@ def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, dict[
     moved, pulled = (loop.datasets[name].values for name in ("displacement", "force"))
     return {
         NODES: {
-            "gap": Dataset(gap, "mm", "of the worn bodies without load; below 0 what it closes"),
+            "gap": Dataset(gap, "mm", "gap of the worn bodies without load; below 0 it closes"),
             **depth_fields(*state.surfaces.depths),
             "normal_force": Dataset(pressed, "N", "of each node at rest"),
             "path": path_field(cycle.path),

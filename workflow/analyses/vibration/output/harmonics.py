@@ -28,7 +28,7 @@ def names_of(rig: RigModel) -> dict[str, Dataset]:
     """Return names of the places ``(p,)`` and of the joints' directions ``(j, d)``."""
     places = np.array([rig.model.names[place] for place in rig.retained], dtype=np.bytes_)
     joints = np.array(rig.stretched, dtype=np.bytes_).reshape(rig.joints, rig.directions)
-    stretch = "of every direction of every joint: what it stretches by"
+    stretch = "stretch of every direction of every joint"
     return {
         "places": Dataset(places, "1", "whose displacements have harmonics"),
         "joints": Dataset(joints, "1", stretch),

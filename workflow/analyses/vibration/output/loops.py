@@ -92,9 +92,9 @@ def loop_of(
     moved = "between the targets, or the mean of the joints, in a cycle"
     datasets = {
         "displacement": Dataset(closed(displacement), "mm", moved),
-        "force": Dataset(closed(force), "N", "of all joints together along it"),
+        "force": Dataset(closed(force), "N", "force of all joints together along it"),
         "expansion": Dataset(
-            closed(expansion), "N", "the same in the harmonics of the motion alone"
+            closed(expansion), "N", "the same force in the harmonics of the motion alone"
         ),
     }
     half = 0.5 * float(np.ptp(force))

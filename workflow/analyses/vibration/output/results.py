@@ -174,9 +174,9 @@ def _write_responses(outcome: VibrationOutcome, folder: OutputFolder) -> None:
             path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
             write_curves(path, response.loops[-1].datasets)
         if response.answers is not None:
-            path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as asked for")
+            path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as requested")
             write_curves(path, response.answers.datasets)
-        what = f"harmonics of places and joints {under}, at resonance and as asked for"
+        what = f"harmonics of places and joints {under}, at resonance and as requested"
         path = folder.reserve(f"harmonics_{number:05d}.csv", what)
         write_harmonics(path, outcome.names, response)
 
@@ -315,7 +315,7 @@ def _further_line(amount: ExcitationSize, branch: Curves) -> str:
     if numbers["closed"]:
         ends = ", closed"
     else:
-        ends = ", which comes out on a known one" if numbers["joins"] else ""
+        ends = ", which leads to a known one" if numbers["joins"] else ""
     return (
         f"{amount.told(numbers[amount.name])}: a further branch from "
         f"{numbers['lowest_frequency']:.5g} to {numbers['highest_frequency']:.5g} Hz{ends}, "

@@ -91,14 +91,14 @@ class VibrationWearOutcome:
             for state in self.states
         ]
         columns = {
-            "cycles": ("1", "under the force that wears"),
-            "energy": ("N mm", "dissipated so far"),
-            "volume": ("mm^3", "worn from both bodies"),
-            "depth": ("mm", "largest of both bodies together"),
-            "area": ("mm^2", "in contact at rest"),
+            "cycles": ("1", "cycles under the force that wears"),
+            "energy": ("N mm", "energy dissipated so far"),
+            "volume": ("mm^3", "volume worn from both bodies"),
+            "depth": ("mm", "largest depth of both bodies together"),
+            "area": ("mm^2", "area in contact at rest"),
             "touching": ("1", "nodes in contact at rest"),
             "peak_pressure": ("MPa", "at rest"),
-            "step_error": ("1", "that wear steps leave of depth or volume, the larger"),
+            "step_error": ("1", "error of depth or volume due to wear steps, the larger"),
             "friction": ("1", "coefficient"),
             "stiffness": (
                 "N/mm",
@@ -106,10 +106,16 @@ class VibrationWearOutcome:
             ),
             "full_slip": ("mm", "motion of the joint from rest at which all of it slides"),
             "stroke": ("mm", "of the joint from end to end, under the force that wears"),
-            "frequency": ("Hz", "of the motion that wears"),
-            "energy_per_cycle": ("N mm", "that joints dissipate under the force that wears"),
-            "work_per_cycle": ("N mm", "of the force that wears"),
-            "damped_per_cycle": ("N mm", "by the damping of the structure, in the same motion"),
+            "frequency": ("Hz", "frequency of the motion that wears"),
+            "energy_per_cycle": (
+                "N mm",
+                "energy dissipated by the joints under the force that wears",
+            ),
+            "work_per_cycle": ("N mm", "amplitude of the force that wears"),
+            "damped_per_cycle": (
+                "N mm",
+                "energy dissipated by the damping of the structure in the same motion",
+            ),
             "stuck": ("Hz", "natural frequencies with the contact stuck"),
             "resonance": ("Hz", "under each force"),
             "receptance": ("mm/N", "largest amplitude of the last mass over the force, under each"),
