@@ -119,7 +119,7 @@ def axes_of(case: Path, base: Sequence[str], names: Sequence[str]) -> dict[Axis,
             offered = ", ".join(axis.name for axis in _applying(AXES, baseline, case, base))
             raise UserError(f"--axis {name}: {wrong}; allowed: {offered or 'none'}")
     if not applying:
-        raise UserError(f"{case}: nothing of a case of this kind can be charted")
+        raise UserError(f"{case}: a case of this kind has nothing to chart")
     return applying
 
 

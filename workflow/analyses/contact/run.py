@@ -15,6 +15,7 @@ from workflow.analyses.contact.output.results import (
     write_contact_output,
     write_contact_results,
 )
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.few_cells import check_cells
 from workflow.shell.folders.folder import OutputFolder
@@ -123,10 +124,11 @@ def _warn_of_increments(outcome: ContactOutcome, reporter: Reporter) -> None:
     place = case.load_path.place(history.error_at)
     left = []
     if history.energy_error > accuracy:
-        left.append(f"{history.energy_error:.1%} of the dissipated energy")
+        left.append(f"{percent(history.energy_error)} of the dissipated energy")
     if history.error > accuracy:
         left.append(
-            f"{history.error:.1%} of µP in the shear (largest at increment {history.error_at + 1})"
+            f"{percent(history.error)} of µP in the shear (largest at increment "
+            f"{history.error_at + 1})"
         )
     if not left:
         return
@@ -139,5 +141,5 @@ def _warn_of_increments(outcome: ContactOutcome, reporter: Reporter) -> None:
         )
     reporter.warn(
         f"the increments of the load cause errors of about {' and '.join(left)}, above "
-        f"contact.accuracy of {accuracy:.1%}: {shorter}"
+        f"contact.accuracy of {percent(accuracy)}: {shorter}"
     )

@@ -31,6 +31,7 @@ from workflow.analyses.specimens.outcome import (
 )
 from workflow.analyses.specimens.results import write_specimens_output
 from workflow.analyses.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.analysis import Run
 from workflow.shell.few_cells import check_cells
@@ -133,7 +134,7 @@ def _fret(
     for state in (first, last):
         if state.misfit is not None and state.misfit > LARGEST_RESIDUAL:
             reporter.warn(
-                f"{name}: the link to the specimens has an error of {state.misfit:.1%} of the "
+                f"{name}: the link to the specimens has an error of {percent(state.misfit)} of the "
                 "deformation of half-spaces, and its pressures may be wrong by as much: raise "
                 "mesh.pad_elements (no mesh is fine enough for the sharp border of unworn flat "
                 "pads)"

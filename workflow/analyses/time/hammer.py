@@ -31,6 +31,7 @@ from workflow.analyses.time.motion import (
     warn_of_steps,
 )
 from workflow.analyses.time.outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import Reporter
@@ -93,8 +94,8 @@ def _state(
     response = frequency_response(blow.value(motion.times), acceleration, step)
     if response.remaining > AT_REST:
         reporter.warn(
-            f"at {joules(energy)} the record ends with {response.remaining:.0%} of the response "
-            "left, which blurs its peaks: raise excitation.record"
+            f"at {joules(energy)} the record ends with {percent(response.remaining)} of the "
+            "response left, which blurs its peaks: raise excitation.record"
         )
     peaks = _peak("first", response, *hammer.band, energy)
     if rig.in_a_row and len(bounds["stuck"]) > 1:

@@ -14,6 +14,7 @@ from sa_solver.steps import COMPUTED, Steps
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
@@ -55,7 +56,7 @@ def warn_of_steps(energy: float, error: float, reporter: Reporter) -> None:
     """Warn where the time steps cause a large error of a motion at an ``energy`` [N mm]."""
     if error > STEPS_LEAVE:
         reporter.warn(
-            f"at {joules(energy)} the time steps cause an error of {error:.1%} of the largest "
+            f"at {joules(energy)} the time steps cause an error of {percent(error)} of the largest "
             "displacement: lower integration.step"
         )
 

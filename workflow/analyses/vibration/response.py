@@ -39,6 +39,7 @@ from workflow.analyses.vibration.output.harmonics import harmonics_of
 from workflow.analyses.vibration.output.loops import loops_of
 from workflow.analyses.vibration.output.outcome import DIAMETERS, RESONANCE, Curves, Response
 from workflow.analyses.vibration.stability import stability_along
+from workflow.case.text.plain import shares
 from workflow.errors import MethodFailed
 from workflow.shell.output.dataset import Dataset, Datasets
 from workflow.shell.terminal.reporter import FORECAST, Reporter
@@ -421,7 +422,7 @@ def warn_of_stroke(
     if stroke > LARGE_STROKE * width:
         reporter.warn(
             f"{told} the pads slide over each other by {stroke:.3g} mm, more than "
-            f"{LARGE_STROKE:.0%} of their width: the result neglects that other nodes then meet"
+            f"{shares(LARGE_STROKE)} of their width: the result neglects that other nodes then meet"
         )
 
 

@@ -22,6 +22,7 @@ from workflow.analyses.vibration.output.outcome import Curves, Response, Vibrati
 from workflow.analyses.vibration.output.results import write_vibration_output
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.stability import looked_for
+from workflow.case.text.readable import percent
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
 from workflow.shell.folders.steps import kept_steps
@@ -110,10 +111,12 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
 def _tell_what_is_left_out(case: VibrationCase, model: VibrationModel, reporter: Reporter) -> None:
     """Report the parts of records that are left out, and stability that is not computed."""
     for number, share in enumerate(model.driving.left_out):
-        reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic is not used")
+        reporter.log(
+            f"record {number + 1}: {percent(share)} above its highest harmonic is not used"
+        )
         if share > LEFT_OUT:
             reporter.warn(
-                f"excitation.records.{number}: {share:.1%} of its force is above the highest "
+                f"excitation.records.{number}: {percent(share)} of its force is above the highest "
                 "harmonic used and is lost: raise highest, or resolution.harmonics"
             )
     if case.stability == "auto" and not looked_for(case, model):

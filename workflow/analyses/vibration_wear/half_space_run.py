@@ -44,7 +44,7 @@ from workflow.analyses.vibration_wear.vibrating_contact import ContactCycle, Vib
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
 from workflow.analyses.wear.translation import wear_of
 from workflow.case.loading import load_case
-from workflow.case.text.plain import counted
+from workflow.case.text.plain import counted, shares
 from workflow.shell.few_cells import check_cells
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.terminal.reporter import Reporter
@@ -155,7 +155,7 @@ class _Description:
         width = float(np.count_nonzero(pressed)) * self.contact.grid.pitch[0]
         if cycle.stroke > LARGE_STROKE * width:
             self.reporter.warn(
-                f"the stroke exceeds {LARGE_STROKE:.0%} of the contact's width: the result "
+                f"the stroke exceeds {shares(LARGE_STROKE)} of the contact's width: the result "
                 "neglects that the surfaces move over each other"
             )
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from workflow.case.text.readable import percent
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -65,7 +66,9 @@ def report_choice(
     if record is None:
         return
     estimated, seconds = record["estimated_error"], record["seconds"]
-    error = f"chosen: estimated error {estimated:.2%} of {record['accuracy']:.2%} required"
+    error = (
+        f"chosen: estimated error {percent(estimated)} of {percent(record['accuracy'])} required"
+    )
     if not again:
         for decision in record["decisions"]:
             reporter.say(f"chosen: {decision['entry']}: {decision['value']}: {decision['why']}")

@@ -29,6 +29,7 @@ from workflow.analyses.vibration.output.outcome import (
 )
 from workflow.analyses.vibration.stability import bifurcation_datasets, columns_for
 from workflow.case.text.plain import counted
+from workflow.case.text.readable import percent
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import CurveAxis, ResultsWriter, run_results
@@ -261,8 +262,8 @@ def _response_line(case: VibrationCase, response: Response, label: str) -> str:
     parts = [
         f"{case.amount.told(response.force)}: resonance {numbers['resonance']:.5g} Hz",
         f"{label} moves {TO_MICRONS * numbers['amplitude']:.4g} um{_beside(numbers)}",
-        f"damping {numbers['damping']:.2%}",
-        f"slips {numbers['slip']:.0%} of the cycle",
+        f"damping {percent(numbers['damping'])}",
+        f"slips {percent(numbers['slip'])} of the cycle",
         f"{numbers['points']} points",
         f"error {numbers['error']:.1e}",
     ]
@@ -340,6 +341,6 @@ def _mode_line(mode: Curves) -> str:
     first, last = numbers["frequency"]
     return (
         f"mode {numbers['mode']}: {first:.5g} Hz at {TO_MICRONS * least:.3g} um, {last:.5g} Hz at "
-        f"{TO_MICRONS * largest:.3g} um, damping up to {numbers['most_damped']:.2%}, "
+        f"{TO_MICRONS * largest:.3g} um, damping up to {percent(numbers['most_damped'])}, "
         f"error {numbers['error']:.1e}"
     )

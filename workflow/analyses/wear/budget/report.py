@@ -9,6 +9,7 @@ import numpy as np
 
 from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.output.layout import PARTS, RESULTS
+from workflow.case.text.readable import percent
 from workflow.shell.output.dataset import Dataset
 
 Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
@@ -50,7 +51,7 @@ def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
     """
     if not errors:
         return
-    told = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in errors.items())
+    told = ", ".join(f"{RESULTS[name]} {percent(error.total)}" for name, error in errors.items())
     yield f"estimated errors: {told}"
     worst = max(errors, key=lambda name: errors[name].total)
     error = errors[worst]
@@ -81,7 +82,7 @@ def warning_of(
         for part in PARTS
     }
     most = max(shares, key=shares.__getitem__)
-    listed = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in beyond.items())
+    listed = ", ".join(f"{RESULTS[name]} {percent(error.total)}" for name, error in beyond.items())
     asked = f"{100.0 * accuracy:g} % ({AT_EDGES:g} times that at worn edges)"
     return (
         f"{name}: estimated errors exceed the accuracy of {asked}: {listed}; mainly due to "

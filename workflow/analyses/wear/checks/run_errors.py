@@ -13,6 +13,7 @@ from workflow.analyses.wear.case.sections import Duration
 from workflow.analyses.wear.output.outcome import InterfaceOutcome
 from workflow.analyses.wear.structure import SETTINGS
 from workflow.analyses.wear.structures import structure_of
+from workflow.case.text.readable import percent
 from workflow.shell.terminal.reporter import Reporter
 
 # Largest error of the peak pressure due to steps without a warning.
@@ -108,12 +109,12 @@ def _warn_of_steps(
         asked = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
     if wear.step.automatic and error > asked:
         reporter.warn(
-            f"{name}: wear steps cause an estimated error of {error:.2%} of depth and volume, "
-            f"above wear.tolerance ({asked:.2%}): take shorter steps ({shorter})"
+            f"{name}: wear steps cause an estimated error of {percent(error)} of depth and volume, "
+            f"above wear.tolerance ({percent(asked)}): take shorter steps ({shorter})"
         )
     if left["pressure"] > PEAK:
         reporter.warn(
-            f"{name}: wear steps cause an estimated error of {left['pressure']:.0%} of the worn "
-            "peak pressure and of what follows from it (fretting life): take shorter steps "
+            f"{name}: wear steps cause an estimated error of {percent(left['pressure'])} of the "
+            "worn peak pressure and of what follows from it (fretting life): take shorter steps "
             f"({shorter})"
         )

@@ -15,6 +15,7 @@ from workflow.analyses.wear.output.link_report import report_link
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.case.text.plain import counted
+from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
@@ -48,7 +49,7 @@ def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: 
     if unworn.closure > CLOSED:
         reporter.warn(
             "the cycle that feeds the wear is not closed: the contact forces of the last two of "
-            f"{unworn.cycles} cycles differ by {unworn.closure:.2%} of the largest"
+            f"{unworn.cycles} cycles differ by {percent(unworn.closure)} of the largest"
         )
     imbalance = float(unworn.equilibrium.max())
     if imbalance > OUT_OF_BALANCE:
@@ -98,8 +99,8 @@ def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Re
     if share > FORM_SHARE:
         reporter.warn(
             f"{face.name}: the form of its faces is uncertain by {1e3 * unsure:.2g} µm, as the "
-            f"mesh has only corner nodes; the peak pressure may be wrong by {share:.0%}: give the "
-            "bodies as CAD, or with midside nodes"
+            f"mesh has only corner nodes; the peak pressure may be wrong by {percent(share)}: "
+            "give the bodies as CAD, or with midside nodes"
         )
 
 
@@ -125,8 +126,8 @@ def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:
     if max(closures) > CLOSED:
         reporter.warn(
             f"structure.file: {source.file}: the cycle that feeds the wear is not closed: its "
-            f"contact forces differ from the cycle before by {max(closures):.2%} of the largest; "
-            "compute more cycles there, and take the last"
+            f"contact forces differ from the cycle before by {percent(max(closures))} of the "
+            "largest; compute more cycles there, and take the last"
         )
 
 

@@ -27,6 +27,7 @@ from workflow.analyses.wear.increments import decide_increments
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import section_joint
 from workflow.case.changing import changed
+from workflow.case.text.readable import percent
 
 # Highest order of convergence of meshes and grids.
 ORDER = 2.0
@@ -184,7 +185,8 @@ def _climb(rungs: Sequence[_Rung], worn: Callable[[_Rung], Numbers], allowed: fl
 
 def _sentence(climb: _Climb, allowed: float, unit: str) -> str:
     text = (
-        f"{climb.taken.size} {unit} cause an error of {climb.error:.2%}, of {allowed:.2%} allowed"
+        f"{climb.taken.size} {unit} cause an error of {percent(climb.error)}, of "
+        f"{percent(allowed)} allowed"
     )
     beyond = "" if climb.error <= allowed else ", the finest available"
     return f"{text} ({climb.worst}){beyond}"
@@ -229,8 +231,8 @@ def choose_drift(case: DovetailCase, allowed: float) -> Decision:
     settings = {"coupling.drift": bounded, "coupling.resultants": "drift"}
     error = effect if drift <= 0.0 else min(effect, effect * bounded / drift)
     why = (
-        f"drift of {drift:.2%} over the run changes depth or volume by {effect:.2%}; "
-        f"allowed: {allowed:.2%}"
+        f"drift of {percent(drift)} over the run changes depth or volume by {percent(effect)}; "
+        f"allowed: {percent(allowed)}"
     )
     probe = {"apart": apart, "coupled": coupled, "drift": drift, "effect": effect}
     return _decision(settings, why, probe, allowed, error)

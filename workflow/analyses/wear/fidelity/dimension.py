@@ -13,6 +13,7 @@ from workflow.analyses.wear.fidelity.probe import NOTCH
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import structure_loads
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 
 ENTRY = "structure.dimension"
@@ -48,8 +49,9 @@ def choose_dimension(case: DovetailCase) -> Decision:
     probe = {"two": values[2], "three": values[3], "differences": differences}
     text = (
         "in a coarse probe of mid-slot, two dimensions differ from three by at most "
-        f"{largest:.1%} ({quantity} on the {flank}); allowed: {MOST_USED * case.accuracy:.1%}; "
-        "the ends of the slot, which may wear more, are not included"
+        f"{percent(largest)} ({quantity} on the {flank}); allowed: "
+        f"{percent(MOST_USED * case.accuracy)}; the ends of the slot, which may wear more, are "
+        "not included"
     )
     allowed = MOST_USED * case.accuracy
     dimension, used = (3, 0.0) if largest > allowed else (2, largest)

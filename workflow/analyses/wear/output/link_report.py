@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from wear.contact.link import StructureLink
+from workflow.case.text.readable import percent
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -38,8 +39,9 @@ def report_link(name: str, link: StructureLink, line: bool, reporter: Reporter) 
         for axis, degree, low, high in zip(axes, link.degrees, *link.region, strict=False)
     )
     reporter.log(
-        f"{name}: the bodies add {bodies:.1%} to the deformation of half-spaces; fitted by "
-        f"polynomials {fit}, with errors of {misfit:.1%} (smooth) and {graininess:.1%} (grainy)"
+        f"{name}: the bodies add {percent(bodies)} to the deformation of half-spaces; fitted by "
+        f"polynomials {fit}, with errors of {percent(misfit)} (smooth) and {percent(graininess)} "
+        "(grainy)"
     )
     if link.coarse:
         why = (
@@ -48,7 +50,7 @@ def report_link(name: str, link: StructureLink, line: bool, reporter: Reporter) 
             else "the deformation changes within fewer nodes than a fit can follow"
         )
         reporter.warn(
-            f"{name}: the link to the structure has errors of {misfit:.1%} (smooth) and "
-            f"{graininess:.1%} (grainy) of the deformation of half-spaces, and pressures may be "
-            f"wrong by as much: {why}; refine the mesh of the contact face"
+            f"{name}: the link to the structure has errors of {percent(misfit)} (smooth) and "
+            f"{percent(graininess)} (grainy) of the deformation of half-spaces, and pressures may "
+            f"be wrong by as much: {why}; refine the mesh of the contact face"
         )

@@ -34,6 +34,7 @@ from workflow.analyses.wear.stress.body_stress import (
     StressedCycle,
     sections,
 )
+from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact
 from workflow.shell.output.dataset import Dataset
 from workflow.shell.output.results import On, ResultsWriter
@@ -341,13 +342,13 @@ def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
     worst = unknown.max(axis=0)
     if worst[peak] > STUCK_SHARE:
         reporter.warn(
-            f"up to {worst[peak]:.0%} of the peak load sticks, so stress.section lacks its shear, "
-            f"and stress.life the stress of that increment: {why}"
+            f"up to {percent(worst[peak])} of the peak load sticks, so stress.section lacks its "
+            f"shear, and stress.life the stress of that increment: {why}"
         )
     if count := int((worst > STUCK_SHARE).sum()):
         reporter.warn(
             f"stress.life leaves out {count} of {len(worst)} increments, in which up to "
-            f"{worst.max():.0%} of the load sticks: {why}"
+            f"{percent(worst.max())} of the load sticks: {why}"
         )
 
 
@@ -365,7 +366,7 @@ def _report_carried(stress: InterfaceStress, reporter: Reporter) -> None:
         left = max(fit.residual for fit in fits)
         reporter.warn(
             f"{stress.name}: what the structure carries beyond the contact is uncertain by "
-            f"{left:.1%} of the deformation of half-spaces, and the stress under it may be wrong "
-            "by as much, and twice as much near the ends of the face: refine the mesh of the "
-            "contact face"
+            f"{percent(left)} of the deformation of half-spaces, and the stress under it may be "
+            "wrong by as much, and twice as much near the ends of the face: refine the mesh of "
+            "the contact face"
         )

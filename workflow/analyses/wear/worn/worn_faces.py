@@ -15,6 +15,7 @@ from workflow.analyses.wear.worn.worn_nodes import (
     worn_displacement,
     write_worn_nodes,
 )
+from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact
 from workflow.models.loads import LoadSource, UserFace
 from workflow.shell.folders.folder import OutputFolder
@@ -43,8 +44,8 @@ def write_worn_faces(
             if worn.volume_share < FULL_SHARE:
                 reporter.warn(
                     f"{stage.name}, body_{face.body}: the nodes carry only "
-                    f"{worn.volume_share:.1%} of the worn volume, as the rest lies outside their "
-                    "face"
+                    f"{percent(worn.volume_share)} of the worn volume, as the rest lies outside "
+                    "their face"
                 )
             summary.setdefault(stage.name, {})[f"body_{face.body}"] = {
                 "file": name,
