@@ -285,7 +285,7 @@ def check(case: str, overrides: tuple[str, ...], out: Path | None, force: bool) 
     for name, text in [*loaded.outline(), *taken(loaded), *needed]:
         click.echo(_fitted(f"  {name:<10} {text}", indent=13))
     for doubt in doubts_of(loaded):
-        click.echo(_fitted(f"doubt: {doubt}", indent=2))
+        click.echo(_fitted(f"warning: {doubt}", indent=2))
     if out is not None:
         if analysis.draw_faces is None:
             raise errors.UserError(f"{case}: has no faces to draw; allowed with --out: a wear case")

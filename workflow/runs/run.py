@@ -290,7 +290,7 @@ def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -
     takes = f" ({expected.short})" if long else ""
     reporter.say(f"{'resume' if resume else 'run'}: {case.title}{takes}")
     for doubt in doubts_of(case):
-        reporter.say(f"doubt: {doubt}", always=True)
+        reporter.say(f"warning: {doubt}", always=True)
 
 
 def _stopped(analysis: Analysis, folder: OutputFolder) -> str:

@@ -95,7 +95,7 @@ def test_what_is_wrong_in_a_list_is_told_alone() -> None:
     ("kind", "key", "words"),
     [
         ("bodies", "contact", "half-space grid, with size below it"),
-        ("joint", "drive", "motion that is imposed on the joint, with stroke, frequency below it"),
+        ("joint", "drive", "imposed motion of the joint, with stroke, frequency below it"),
         ("mesh", "structure.contacts.0.x.0", "a longer one, such as [1.0, 0.0, 0.0]"),
     ],
 )

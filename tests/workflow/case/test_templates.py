@@ -49,7 +49,7 @@ NEEDS = {
     "structure.cyclic": [SECTOR],
     **{f"structure.matrices.{part}": [APART] for part in APART_MATRICES},
     # Points whose spacing lets a scan cover the whole face of the template.
-    " surfaces:  # as measured, on top of the gap, or": [
+    " surfaces:  # measured surfaces of every face, added to the gap, or": [
         "structure.surfaces.body_1.pitch=[0.1, 0.2]"
     ],
     " intrados:  # flank at": ["structure.surfaces.intrados.disk.pitch=[0.1, 0.2]"],

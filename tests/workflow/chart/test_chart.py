@@ -221,9 +221,9 @@ def test_sentences_say_what_to_take():
 
 def test_sentences_say_when_nothing_is_enough():
     grid, method, together = sentences(charted(1e-3 / 2))
-    assert "no rung is known to be enough: the best, fine, is within 5 %" in grid
+    assert "no rung is known to be sufficient: the best, fine, is within 5 %" in grid
     assert "take full: 9 s, 90 convolutions, the reference, by definition" in method
-    assert "no choice of rungs is known to be enough" in together
+    assert "no choice of rungs is known to be sufficient" in together
     assert combination(charted(1e-3 / 2)) is None
 
 

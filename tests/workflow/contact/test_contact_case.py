@@ -40,7 +40,7 @@ WRONG = [
     ("unknown key of a body", BALL, "{young: 115 GPa,", "{yuong: 115 GPa,",
      "materials.body_1.yuong", "'young'"),
     ("unknown body", BALL, *RIGID_2[:1], "  body_2: steel", "materials.body_2",
-     "'steel': no known material; allowed: a name that `fretscale materials` lists"),
+     "'steel': unknown material; allowed: a name that `fretscale materials` lists"),
     ("rigid, misspelt", BALL, *RIGID_2[:1], "  body_2: rigidly", "materials.body_2", "'rigid'"),
     ("number for a body", BALL, *RIGID_2[:1], "  body_2: 3", "materials.body_2", "section"),
     ("both rigid", BALL.replace(*RIGID_2), "body_1: {young: 115 GPa, poisson: 0.29}",
@@ -80,7 +80,7 @@ WRONG = [
     ("shear without friction", BALL, "friction: {coefficient: 0.7}\n", "", "friction",
      "missing, but load_path has Qx"),
     ("unlike bodies without friction", BALL.replace(*RIGID_2).replace("Qx: 210 N", "Mx: 1 N*mm"),
-     "friction: {coefficient: 0.7}\n", "", "friction", "missing, but unlike bodies rub"),
+     "friction: {coefficient: 0.7}\n", "", "friction", "missing, but dissimilar bodies rub"),
     ("wear in a contact case", BALL, "contact:", "wear: {law: energy}\ncontact:", "wear",
      "unknown key"),
 ]  # fmt: skip

@@ -132,7 +132,7 @@ def test_run_with_a_damaged_cache_finds_the_same_and_says_so(start, whole, tmp_p
     assert not run.summary["structure"]["from_cache"]
     log = (run.folder / "run.log").read_text("utf-8")
     # The joint, the halves of both bodies, and the cycle.
-    assert log.count("damaged: not what was written there; computed again") == damaged == 6
+    assert log.count("damaged: it differs from what was written; computed again") == damaged == 6
 
 
 # --- finished runs --------------------------------------------------------------------------------
@@ -208,7 +208,7 @@ def test_finished_run_that_was_changed_is_computed_again(left, finished, damage,
     assert "start again with" in str(refusal.value)
     assert bring_to_end(case, out)
     log = (out / "run.log").read_text("utf-8")
-    assert "an earlier run is not taken: " in log
+    assert "an earlier run is not used: " in log
     assert wrong in log
     assert (out / "results.h5").read_bytes() == (finished / "out/results.h5").read_bytes()
 

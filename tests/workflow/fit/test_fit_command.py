@@ -95,7 +95,7 @@ def test_friction_is_of_loops_that_slide(folder):
     found = fretscale.fit(folder / "joint.yaml")
     assert found["joint.friction"].value == pytest.approx(0.11, rel=1e-6)
     (doubt,) = (doubt for doubt in found.doubts if doubt.startswith("mu: "))
-    assert doubt == "mu: left out where loops do not slide as a whole (loops.csv:7)"
+    assert doubt == "mu: not used where loops do not slide as a whole (loops.csv:7)"
     text = "\n".join([lines[0], *(line.rpartition(",")[0] + ", 0.5" for line in lines[1:]), ""])
     (folder / "loops.csv").write_text(text, encoding="utf-8")
     refused = invoke("fit", folder / "joint.yaml")

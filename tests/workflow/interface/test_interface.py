@@ -120,7 +120,7 @@ def test_a_check_says_what_the_command_says(monkeypatch):
     assert checked.memory > 1e9
     doubted = fretscale.check(SPHERE, materials__body_1__young="210 MPa")
     assert "210 MPa" in doubted.doubts[0]
-    assert f"doubt: {doubted.doubts[0]}" in str(doubted)
+    assert f"warning: {doubted.doubts[0]}" in str(doubted)
     monkeypatch.setattr("workflow.shell.memory._available_bytes", lambda: 1e9)
     with pytest.raises(fretscale.OutOfMemory, match=r"1\.0 GB are free"):
         fretscale.check(SPHERE)

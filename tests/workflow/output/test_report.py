@@ -112,7 +112,7 @@ def test_page_tells_all_of_a_run_and_needs_nothing_else(drawn):
     assert "115 GPa" in page.told["The case"]
     assert "friction" in page.told["The case"]
     assert (drawn / "case.yaml").read_text("utf-8") in page.told["The case file"]
-    assert "numpy" in page.told["How it was computed"]
+    assert "numpy" in page.told["Methods"]
     seconds = json.loads((drawn / "summary.json").read_text("utf-8"))["seconds"]
     told = [name for name in seconds if name in page.told["Time"]]
     assert told == [name for name, spent in seconds.items() if spent >= AT_ONCE]
@@ -294,7 +294,7 @@ def test_warnings_that_places_share_are_told_once():
 
 def test_no_number_of_a_page_has_a_hyphen_for_minus(drawn):
     page = Page((drawn / "report.html").read_text("utf-8"))
-    for heading in ("What was computed", "Results", "The case"):
+    for heading in ("Analysis", "Results", "The case"):
         assert not re.search(r"(?<![\w.\])-])-\d", page.told[heading])
 
 

@@ -113,7 +113,7 @@ def test_pads_pressed_evenly_are_closed_evenly_if_contacts_share_by_area(files):
         ("joint={law: jenkins, normal_load: 60, friction: 1, stiffness: 1}", "friction_contact"),
         ("joint.normal_load=0", "above 0"),
         ("joint={law: friction_contact, normal_load: 0, gap: 1 um, friction: 1, stiffness: 1, "
-         "normal_stiffness: 1}", "allowed: their own form"),
+         "normal_stiffness: 1}", "given with specimens"),
         ("mass=1", "given beside friction_rig"),
         ("structure.target_distance=0", "above 0"),
     ],

@@ -386,7 +386,7 @@ def test_nonsense_in_a_row_is_refused(tmp_path, overrides, key, said):
             ["structure.joints.0.against=damper"],
             "structure.joints.0.against=damper: damper against itself",
         ),
-        ([f"joint={SLIDER}"], "jenkins: given, but every entry of joints has a law of its own"),
+        ([f"joint={SLIDER}"], "jenkins: not used, because every entry of joints"),
         (["structure.joints.0.points=dumper"], "structure.joints.0.points=dumper: 'dumper': no"),
     ],
 )

@@ -87,5 +87,5 @@ def test_one_that_has_worn_to_a_point_is_warned_of():
     pressure[10, 10] = 1.0
     check_cells("pad", settings, grid, pressure, told, worn=True)
     assert "pad is 1 x 1 cells across after wear" in told[0]
-    with pytest.raises(UserError, match="says nothing of its size"):
+    with pytest.raises(UserError, match="its size and pressure are meaningless"):
         check_cells("pad", settings, grid, pressure, told)

@@ -53,7 +53,7 @@ LAWS = ("bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan")
         (RIG, "ageing={energy: 1 J}|energies=[2 J]", "beyond the end"),
         (RIG, f"{HAMMER}|integration.step=20 us|ageing.energy=1 J", "with a harmonic force"),
         (RIG, f"{HAMMER}|excitation.band=[3 Hz, 2 Hz]", "not ascending"),
-        (RIG, f"{HAMMER}|excitation.record=1 ms", "over with the blow"),
+        (RIG, f"{HAMMER}|excitation.record=1 ms", "ends with the blow"),
     ],
 )
 def test_a_wrong_case_is_refused(text, override, words):
@@ -293,7 +293,7 @@ def test_what_can_be_charted(tmp_path):
     with pytest.raises(UserError, match="does not apply to this case; allowed: step"):
         axes_of(path, [], ["grid"])
     path.write_text(JOINT, encoding="utf-8")
-    with pytest.raises(UserError, match="nothing of a case of this kind can be charted"):
+    with pytest.raises(UserError, match="a case of this kind has nothing to chart"):
         axes_of(path, [], [])
 
 

@@ -98,7 +98,7 @@ def test_a_curve_that_does_not_get_there_says_so(tmp_path):
     ("entry", "message"),
     [
         ("at=[10 Hz]", "10 Hz: outside; allowed: within frequencies, 80 to 200 Hz"),
-        ("at=[120 Hz, 100 Hz]", "not ascending; allowed: each frequency above the last"),
+        ("at=[120 Hz, 100 Hz]", "not ascending; allowed: ascending frequencies"),
         ("at=[0 Hz]", "'0 Hz': out of range"),
         ("harmonics_along_curves=2", "2: not a switch; allowed: true or false"),
     ],

@@ -287,8 +287,8 @@ def test_a_section_or_a_file_has_no_uniformity(plane_path):
 def test_sentence_of_a_uniform_slot():
     good = Uniformity(0.01, 0.02, 0.03, 0.6, 1.0 + 0.5 * ALIKE, uniform=True)
     assert good.sentence("intrados") == (
-        "intrados: sections alike within 5% over the middle 60% of the length: "
-        "two dimensions give the middle, with 2.5% more load"
+        "intrados: sections differ by less than 5 % over the middle 60 % of the length: "
+        "a model in two dimensions gives the middle, with 2.5 % more load"
     )
 
 
@@ -377,7 +377,7 @@ def test_choice_is_kept_until_the_run_is_finished(plane_path, tmp_path):
 
 def test_check_says_that_a_probe_decides(plane_path):
     told = invoke("check", plane_path, "--set", "fidelity=auto", "--set", "accuracy=4 %").stdout
-    assert "2-D or 3-D and how fine, by probes: 4 %" in told
+    assert "2-D or 3-D and how fine: chosen by probes for 4 %" in told
     fixed = invoke("check", plane_path).stdout
     assert "by probes" not in fixed
     assert "fidelity fixed" in fixed  # among what nobody has said

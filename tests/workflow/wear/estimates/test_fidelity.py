@@ -134,7 +134,7 @@ def test_mesh_in_space_is_never_finer_than_written(case, monkeypatch):
     assert decision.value == (9, 9)
     assert not decision.met
     assert decision.error == pytest.approx(1.0 / 8 / (1.0 + 1.0 / 32), rel=1e-9)
-    assert "the finest that is offered" in decision.why
+    assert "the finest available" in decision.why
 
 
 def by_strips(case):

@@ -157,7 +157,10 @@ def test_nothing_slides_in_the_fewest(blocks):
 def test_check_tells_how_many_there_may_be(blocks):
     for path in (PLANE, blocks):
         told = command("check", path, overrides=[AUTO, "wear.tolerance=4 %"]).stdout
-        assert "as many increments as leave 4 % of depth, about 12 and at most 1000" in told
+        assert (
+            "as many increments as depth needs for an error of 4 %, about 12 and at most 1000"
+            in told
+        )
     assert MOST_INCREMENTS == 1000
 
 
@@ -167,8 +170,8 @@ def test_check_tells_how_many_there_may_be(blocks):
         ("load_path.increments=atuo", "'atuo': not known; allowed: auto, or whole numbers"),
         ("load_path.increments=[0, 9]", "0: out of range; allowed: a whole number from 1 to 10000"),
         ("load_path.increments=[8, 14, 8]", "too long; allowed: a list of 2"),
-        ("load_path.increments=22", "22: of a whole cycle; allowed: up to the peak and down from"),
-        ("load_path.peak_at=8", "the first leg of increments, which are [8, 14] where the speed"),
+        ("load_path.increments=22", "22: for a whole cycle; allowed: up to the peak and down from"),
+        ("load_path.peak_at=8", "the first leg of increments: [8, 14]"),
     ],
 )
 def test_what_is_no_number_of_increments_is_refused(override, message):

@@ -149,10 +149,10 @@ def test_check_tells_bodies_and_terms(strips):
             ["structure.contacts.0.face_1=shim_above"],
             "boundary shim_above is on body shim, not on base",
         ),
-        (["nonlinearity.check=true"], "known of two bodies"),
+        (["nonlinearity.check=true"], "only for two bodies"),
         (
             ["contact.method=nodes", "wear.step.kind=second_order"],
-            "structure.contacts: not where nodes wear",
+            "structure.contacts: not available where nodes wear",
         ),
     ],
 )

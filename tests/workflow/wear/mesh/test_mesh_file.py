@@ -29,7 +29,7 @@ def test_what_a_file_says_besides_is_named(blocks, tmp_path):
         f"not taken over: blocks.inp:{line + 6}: *friction: 0.3",
     ]
     said = " ".join(invoke("check", blocks).output.split())
-    assert "3 lines with loads, supports, contact or materials not taken over" in said
+    assert "3 lines with loads, supports, contacts or materials not used" in said
 
 
 def test_a_face_in_two_parts(blocks, tmp_path):
@@ -48,7 +48,7 @@ def test_a_face_in_two_parts(blocks, tmp_path):
     summary = run(blocks, tmp_path / "out", f"{face}[low_a, low_b]")
     assert summary["foot"]["peak_load"]["unworn"]["P"] == pytest.approx(40.0, rel=1e-6)
     assert "a boundary twice; allowed: each once" in refused(blocks, f"{face}[low_a, low_a]")
-    assert "none; allowed: a boundary, or several" in refused(blocks, f"{face}[]")
+    assert "none; allowed: one boundary or several" in refused(blocks, f"{face}[]")
     assert "no boundary low_c on body Foot-1" in refused(blocks, f"{face}[low_a, low_c]")
 
 

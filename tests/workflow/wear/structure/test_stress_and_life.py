@@ -272,7 +272,7 @@ def test_shear_that_nobody_knows_is_warned_of(share: float, count: int) -> None:
 
 @pytest.mark.parametrize(
     ("fits", "told"),
-    [([0.01, 0.02], ""), ([0.01, 0.04], "known but for 4.0%"), ([0.01], "too few nodes")],
+    [([0.01, 0.02], ""), ([0.01, 0.04], "uncertain by 4.0 %"), ([0.01], "too few nodes")],
 )
 def test_what_is_not_known_of_the_structure_is_warned_of(fits: list[float], told: str) -> None:
     links = [
@@ -302,7 +302,10 @@ def test_switched_off_it_leaves_nothing(start: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("overrides", "words"),
     [
-        (["stress.at=31 mm"], "stress.at: 31 mm is off the contact's grid; allowed: -30 to 30 mm"),
+        (
+            ["stress.at=31 mm"],
+            "stress.at: 31 mm is outside the contact's grid; allowed: -30 to 30 mm",
+        ),
         (["stress.depth=10 um"], "allowed: above life.depth, 0.02 mm"),
         (["structure.dimension=2", "stress.section=y"], "a line contact has no length along y"),
     ],
