@@ -265,7 +265,7 @@ def test_every_error_has_its_line(tmp_path, dovetail_text):
         ("structure.edge_width=\t1", "a tab"),
         ("structure.edge_width=31 mm", "edge_radius"),
         ("structure.rim_radius=500 mm", "airfoil"),
-        ("load_path.increments=5", "of a whole cycle"),
+        ("load_path.increments=5", "for a whole cycle"),
         ("wear.step.fraction=0.5", "with explicit"),
         ("wear.stop.depht=1 um", "did you mean 'depth'?"),
         ("output=", "not a section"),

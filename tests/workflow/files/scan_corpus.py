@@ -279,7 +279,7 @@ REFUSED = {
     "words.txt": (points("x [um] y [um] z [um]", " ").replace("nan", "***").encode(), "'***'",
                   "nothing where one is missing"),
     "marks.txt": (gwyddion(ENGLISH).replace("# Width", "# Pitch").encode(), "unit and pitch",
-                  "both beside"),
+                  "state both"),
     "binary.txt": (bytes(range(256)), "cannot be read", "UTF-8, UTF-16 or Latin-1"),
     "s.nms": (b"", "no scan in a supported format", "export it as .x3p"),
     "s.zmg": (b"Zeta-Instruments", "no scan in a supported format", "export it as .x3p"),

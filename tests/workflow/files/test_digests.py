@@ -191,8 +191,8 @@ DAMAGES = [
     (torn_summary, "summary.json: damaged"),
     (odd_summary, "summary.json: damaged"),
     (summary_of_an_older_version, "summary.json: damaged, or of an older version"),
-    (bit_in_results, "results.h5: not as the run"),
-    (no_results, "results.h5: not as the run"),
+    (bit_in_results, "results.h5: differs from the run"),
+    (no_results, "results.h5: differs from the run"),
 ]
 
 
@@ -220,7 +220,7 @@ def test_finished_run_of_other_files_is_computed_again(finished, left):
     try:
         swap(loads, b"400, 150, 0, 3\n", b"400, 150, 0, 4\n")
         assert kept_in(out, case) == "nothing"
-        with pytest.raises(UserError, match=r"loads\.csv: not as the run in"):
+        with pytest.raises(UserError, match=r"loads\.csv: differs from the run"):
             resume_run(out)
     finally:
         loads.write_bytes(before)
@@ -234,7 +234,7 @@ def test_finished_run_whose_case_was_changed_is_not_its_run(left, finished):
     assert kept_in(out, case) == "other"
     other = load_case(finished / "wear.yaml", ("friction.coefficient=0.6",))
     assert kept_in(out, other) == "nothing"
-    with pytest.raises(UserError, match=r"case\.yaml: not as the run in"):
+    with pytest.raises(UserError, match=r"case\.yaml: differs from the run"):
         resume_run(out)
 
 

@@ -174,7 +174,7 @@ def test_no_page_of_what_is_no_finished_run(drawn, tmp_path):
     for name in ("case.yaml", "summary.json", "results.h5", "manifest.json"):
         (tmp_path / name).write_bytes((drawn / name).read_bytes())
     (tmp_path / "results.h5").write_bytes(b"other")
-    with pytest.raises(UserError, match=r"results\.h5: not as the run"):
+    with pytest.raises(UserError, match=r"results\.h5: differs from the run"):
         write_report(tmp_path)
     (tmp_path / "summary.json").write_text("{}", encoding="utf-8")
     with pytest.raises(UserError, match="damaged, or of an older version"):

@@ -39,7 +39,7 @@ def stopped(start, tmp_path_factory):
     assert run.ending.exit_code == 130
     last = run.ending.stderr.splitlines()[-1]
     assert last.startswith("fretscale: interrupted")
-    assert last.endswith(f"go on with `fretscale resume {run.folder}`")
+    assert last.endswith(f"continue with `fretscale resume {run.folder}`")
     return run
 
 

@@ -303,7 +303,7 @@ def test_loops_are_read_only_of_a_run_as_it_was_written(rubbed, tmp_path):
     shutil.copytree(rubbed.folder, tmp_path / "cut")
     os.truncate(tmp_path / "cut/results.h5", 5000)
     refused = invoke("loops", tmp_path / "cut")
-    assert (refused.exit_code, "not as the run" in refused.stderr) == (2, True)
+    assert (refused.exit_code, "differs from the run" in refused.stderr) == (2, True)
 
 
 def test_run_writes_a_table_for_every_interface(rubbed):
