@@ -100,7 +100,7 @@ def _notes(fitted: Fitted) -> list[str]:
         f"{first} and {second} have a correlation of {value:.3f}: neither is determined alone"
         for first, second, value in _close(fitted)
     ]
-    return lines + [f"doubt: {doubt}" for doubt in fitted.doubts]
+    return lines + [f"warning: {doubt}" for doubt in fitted.doubts]
 
 
 def _close(fitted: Fitted) -> list[tuple[str, str, float]]:

@@ -95,7 +95,7 @@ def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
         ("bodies_wear", "50 N, stroke 20 µm in 8 increments"),
         ("line_wear", "50 N/mm, stroke 20 µm in 8 increments"),
         ("bodies", "128 x 128 cells of 7.812 µm x 7.812 µm, history auto"),
-        ("line", "512 strips of 3.906 µm"),
+        ("line", "512 cells of 3.906 µm"),
         ("joint", "bouc_wen, normal load 60 N, friction 0.11, stiffness 27.3 N/µm"),
         ("rig", "75 N at 100 Hz on mass 1"),
         ("vibration", "10, 40 N on mass 1, at 20 to 400 Hz"),

@@ -53,9 +53,9 @@ WRONG = [
     ("Mz on a line", ROLLER, "Qx: 210 N/mm", "Mz: 1 N", "load_path.legs.1.Mz", "unknown key"),
     ("pulling", BALL, "P: 400 N", "P: -400 N", "load_path.legs.0.P", "0 to 1e6 kN"),
     ("P and approach in one leg", BALL, "P: 400 N", "P: 400 N, approach: 1 um",
-     "load_path.legs.0.approach", "beside P"),
+     "load_path.legs.0.approach", "with P"),
     ("force and motion in two legs", BALL, "- {P: 400 N}", "- {P: 400 N, shift_x: 1 um}",
-     "load_path.legs.0.shift_x", "beside Qx"),
+     "load_path.legs.0.shift_x", "with Qx"),
     ("neither P nor approach", BALL, "P: 400 N", "Qy: 1 N", "load_path.legs",
      "neither P nor approach"),
     ("no legs", BALL, BALL[BALL.index("\n  legs:"):BALL.index("\ncontact")], " {legs: []}",
@@ -213,7 +213,7 @@ def test_wrong_path_file_is_told_with_both_lines(tmp_path, content, line, words)
 
 @pytest.mark.parametrize(
     ("content", "words"),
-    [("Qx\n1\n", "neither P nor approach"), ("P,approach\n1,0\n", "beside P")],
+    [("Qx\n1\n", "neither P nor approach"), ("P,approach\n1,0\n", "with P")],
 )
 def test_columns_of_a_path_file_must_agree(tmp_path, content, words):
     (tmp_path / "history.csv").write_text(content, encoding="utf-8")

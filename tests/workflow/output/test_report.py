@@ -207,7 +207,7 @@ def test_results_say_what_they_hold(analysis, tmp_path):
         read_contents(path, kind)
     with h5py.File(path, "w"):
         pass
-    with pytest.raises(UserError, match="does not say what it holds"):
+    with pytest.raises(UserError, match="has no contents list"):
         read_contents(path, kind)
     assert kind is not NoneType
 

@@ -114,7 +114,7 @@ def test_pads_pressed_evenly_are_closed_evenly_if_contacts_share_by_area(files):
         ("joint.normal_load=0", "above 0"),
         ("joint={law: friction_contact, normal_load: 0, gap: 1 um, friction: 1, stiffness: 1, "
          "normal_stiffness: 1}", "given with specimens"),
-        ("mass=1", "given beside friction_rig"),
+        ("mass=1", "given with friction_rig"),
         ("structure.target_distance=0", "above 0"),
     ],
 )  # fmt: skip

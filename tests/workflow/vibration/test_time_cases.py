@@ -72,7 +72,7 @@ def test_evolution_of_what_the_joint_has_not_is_refused():
 def test_a_file_beside_a_factor_is_refused(tmp_path):
     (tmp_path / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
     evolution = "evolution={file: loops.csv, friction: {kind: linear, slope: 0}}"
-    with pytest.raises(CaseError, match="given beside friction"):
+    with pytest.raises(CaseError, match="given with friction"):
         parse_case(JOINT, str(tmp_path / "case.yaml"), [evolution])
 
 

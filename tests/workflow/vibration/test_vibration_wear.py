@@ -318,7 +318,7 @@ def test_a_case_is_written_as_it_was_read(tmp_path):
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        ("body_2: {young: 200 GPa", "body_2: {young: 100 GPa", "not alike"),
+        ("body_2: {young: 200 GPa", "body_2: {young: 100 GPa", "dissimilar materials"),
         ("coefficient: 0.4", "coefficient: 0", "no friction"),
         ("tolerance: 10 %", "step: {cycles: 100}", "wear.step of a given size"),
         ("grid: [16, 16]", "grid: [16, 2000, 1]", "contact.file: "),

@@ -268,7 +268,7 @@ def test_warning_of_a_contact_that_outgrows_its_grid():
     warn_of_border(loops, Loops(amplitude=5e-3, normal_force=1e4), reporter)
     assert len(said) == 1
     assert "face: in the tangential loops" in said[0]
-    assert "2.0%" in said[0]
+    assert "2.0 %" in said[0]
 
 
 # --- runs ---------------------------------------------------------------------------------------

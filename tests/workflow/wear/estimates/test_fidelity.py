@@ -94,7 +94,7 @@ def test_increments_are_those_of_the_section(case):
     fixed = axes.choose_increments(in_space(case), 0.02)
     auto = axes.choose_increments(changed(case, {"load_path.increments": "auto"}), 0.02)
     assert auto.chosen == fixed.chosen
-    assert fixed.why.startswith(f"{auto.why}; the case's own 22 leave 0.")
+    assert fixed.why.startswith(f"{auto.why}; the 22 of the case cause 0.")
 
 
 @pytest.mark.slow

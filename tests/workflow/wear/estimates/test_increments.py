@@ -133,7 +133,7 @@ def test_more_than_the_most_are_not_chosen_and_it_is_told(monkeypatch):
     decision = decide_increments(case, dovetail_joint, 1e-4)
     assert sum(decision.value) == 12
     assert not decision.met
-    assert "the most that are offered" in decision.why
+    assert "the most available" in decision.why
 
 
 def test_cycles_of_few_increments_that_fail_ask_for_more(monkeypatch):

@@ -34,7 +34,7 @@ def test_a_check_says_what_is_used_of_midsides(tmp_path):
     case = pressed(tmp_path, 2, 1)
     assert "midside" not in invoke("check", case).output
     said = " ".join(invoke("check", case, "--set", "mesh.order=2").output.split())
-    assert "foot of order 2, straight: the file has no midside nodes of it" in said
+    assert "foot of order 2, straight: the file has no midside nodes for it" in said
     (tmp_path / "second").mkdir()
     case = pressed(tmp_path / "second", 2, 2)
     said = " ".join(invoke("check", case).output.split())

@@ -266,7 +266,7 @@ def test_shear_that_nobody_knows_is_warned_of(share: float, count: int) -> None:
         unknown[1, increment] = share
         _report_stick(unknown, 1, heard)
         assert [line[:13] for line in heard.said] == (
-            ["up to 30% of "] * more + ["stress.life l"] * count
+            ["up to 30 % of"] * more + ["stress.life l"] * count
         )
 
 

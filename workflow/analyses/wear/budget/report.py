@@ -56,7 +56,7 @@ def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
     worst = max(errors, key=lambda name: errors[name].total)
     error = errors[worst]
     parts = [
-        f"{name} {part:{'+' if name in error.signed else ''}.1%}"
+        f"{name} {'+' * (name in error.signed and part > 0.0)}{percent(part)}"
         for name, part in error.largest[:MOST_PARTS]
         if part and abs(part) >= WORTH_TELLING * error.total
     ]

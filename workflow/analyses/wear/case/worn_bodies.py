@@ -56,9 +56,9 @@ class EnergyBody(Section):
     """Wear of one body by dissipated energy."""
 
     refused: ClassVar[Mapping[str, str]] = {
-        "specific_wear_rate": "archard's entry; allowed: coefficient, which is that rate over "
+        "specific_wear_rate": "belongs to archard; allowed: coefficient, which is that rate over "
         "the coefficient of friction, or law: archard",
-        "hardness": "archard's entry; allowed: coefficient alone, or law: archard",
+        "hardness": "belongs to archard; allowed: coefficient alone, or law: archard",
     }
 
     coefficient: VolumePerEnergy = entry(
