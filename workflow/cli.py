@@ -39,8 +39,8 @@ All commands: `fretscale -h`; a case of few lines: `fretscale new KIND --short`.
 def _loud(command: Command) -> Command:
     """Add the switches of all commands that compute."""
     for switch, level, text in (
-        ("-v/--verbose", "VERBOSE", "Say all that goes to the log, too."),
-        ("-q/--quiet", "QUIET", "Say nothing but errors and warnings."),
+        ("-v/--verbose", "VERBOSE", "Print everything that goes to the log."),
+        ("-q/--quiet", "QUIET", "Print only errors and warnings."),
     ):
         names = switch.split("/")
         command = click.option(*names, "loudness", flag_value=level, help=text)(command)
@@ -60,7 +60,7 @@ def _repeatable(out: Path) -> Iterator[None]:
         yield
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(
-            f"{out} keeps the runs that are done; go on with the same command"
+            f"{out} keeps the finished runs; continue with the same command"
         ) from stop
 
 
@@ -112,7 +112,9 @@ def resume(folder: Path, loudness: str | None) -> None:
 
 @cli.command()
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Another file than its report.html.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="File to write, instead of its report.html."
+)
 def report(folder: Path, out: Path | None) -> None:
     """Write the page of the finished run in FOLDER anew."""
     from workflow.report.writing import write_report
@@ -155,7 +157,7 @@ def verify(cases: tuple[Path, ...], out: Path, loudness: str | None) -> int:
 def compare(folders: tuple[Path, ...], out: Path | None, force: bool) -> None:
     """Put finished runs side by side: results, cases, curves.
 
-    The first is what the others are held against. All must be runs of one analysis.
+    The first is the reference. All must be runs of one analysis.
     """
     from workflow.comparing import compare
     from workflow.comparing.showing import show
@@ -174,8 +176,12 @@ def compare(folders: tuple[Path, ...], out: Path | None, force: bool) -> None:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--axis", "axes", multiple=True, metavar="NAME", help="Only this approximation.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
-@click.option("--quantity", "quantities", multiple=True, metavar="PATH", help="In summary.json.")
-@click.option("--accuracy", default="1 %", show_default=True, help="To choose settings for.")
+@click.option(
+    "--quantity", "quantities", multiple=True, metavar="PATH", help="Path in summary.json."
+)
+@click.option(
+    "--accuracy", default="1 %", show_default=True, help="Accuracy for which settings are chosen."
+)
 @_loud
 def chart(
     case: Path,
@@ -221,7 +227,9 @@ def chart(
 @click.argument("file", metavar="SWEEP", type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--processes", type=click.IntRange(1), help="Cores to use; all by default.")
-@click.option("--dask", metavar="ADDRESS", help="Of a dask.distributed scheduler, to run there.")
+@click.option(
+    "--dask", metavar="ADDRESS", help="Address of a dask.distributed scheduler, to run there."
+)
 @click.option("--force", is_flag=True, help="Overwrite runs of another case.")
 @_loud
 def sweep(
@@ -277,7 +285,7 @@ def check(case: str, overrides: tuple[str, ...], out: Path | None, force: bool) 
     for name, text in [*loaded.outline(), *taken(loaded), *needed]:
         click.echo(_fitted(f"  {name:<10} {text}", indent=13))
     for doubt in doubts_of(loaded):
-        click.echo(_fitted(f"doubt: {doubt}", indent=2))
+        click.echo(_fitted(f"warning: {doubt}", indent=2))
     if out is not None:
         if analysis.draw_faces is None:
             raise errors.UserError(f"{case}: has no faces to draw; allowed with --out: a wear case")
@@ -314,9 +322,9 @@ def resultants(case: str, out: Path, overrides: tuple[str, ...], force: bool) ->
 @cli.command()
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--body", type=click.Choice(["1", "2"]), required=True, help="The lower is 1.")
-@click.option("--unworn", is_flag=True, help="As it was before the first cycle.")
-@click.option("--interface", help="Of several.")
+@click.option("--body", type=click.Choice(["1", "2"]), required=True, help="1 is the lower body.")
+@click.option("--unworn", is_flag=True, help="Before the first cycle.")
+@click.option("--interface", help="Name, if there are several.")
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 def surface(folder: Path, file: Path, **given: Any) -> None:
     """Write a surface of the run in FOLDER to a profilometer's FILE.
@@ -330,10 +338,14 @@ def surface(folder: Path, file: Path, **given: Any) -> None:
 
 @cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
-@click.option("--unit", help="Of lengths in the file: mm, um, cm, m, in or ft.")
+@click.option(
+    "--size", metavar="LENGTH", help="Size of the elements, for a CAD file, such as '2 mm'."
+)
+@click.option("--unit", help="Unit of lengths in the file: mm, um, cm, m, in or ft.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for a picture and a .vtu.")
-@click.option("--case", type=click.Path(path_type=Path), help="Case to write of what FILE says.")
+@click.option(
+    "--case", type=click.Path(path_type=Path), help="File for a case of what FILE contains."
+)
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
 def describe(
     file: Path,
@@ -398,7 +410,7 @@ class _KindsInHelp(click.Command):
 @cli.command(cls=_KindsInHelp)
 @click.argument("kind", required=False, type=_Kind())
 @click.argument("file", required=False, type=click.Path(path_type=Path))
-@click.option("--short", is_flag=True, help="Only what must be given, in some twenty lines.")
+@click.option("--short", is_flag=True, help="Only the required entries, in some twenty lines.")
 def new(kind: str | None, file: Path | None, short: bool) -> None:
     """Write a commented case to FILE; without KIND list the kinds.
 
@@ -414,7 +426,7 @@ def new(kind: str | None, file: Path | None, short: bool) -> None:
     else:
         example = write_new(kind, file, short)
         if example is not None:
-            click.echo(f"{example}: an example, which {file} names; replace it by yours")
+            click.echo(f"{example}: an example, which {file} names; replace it by your own file")
 
 
 @cli.command()

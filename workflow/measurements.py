@@ -14,8 +14,12 @@ import click
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for a table and a figure.")
-@click.option("--normal-load", metavar="FORCE", help="Such as '60 N', if FILE has no column of it.")
-@click.option("--column", "columns", multiple=True, metavar="KEY=NAME", help="Another heading.")
+@click.option(
+    "--normal-load", metavar="FORCE", help="Such as '60 N', if FILE has no column for it."
+)
+@click.option(
+    "--column", "columns", multiple=True, metavar="KEY=NAME", help="Heading of FILE for a quantity."
+)
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
 def loops(
     file: Path, out: Path | None, normal_load: str | None, columns: tuple[str, ...], force: bool
@@ -32,7 +36,7 @@ def loops(
         from workflow.commands.computed_loops import report_of_run
 
         if out is not None or normal_load is not None or columns:
-            raise click.UsageError("a run has its loads and tables; allowed: no options beside it")
+            raise click.UsageError("a run has its loads and tables; allowed: no other options")
         for line in report_of_run(file):
             click.echo(line)
         return
@@ -49,8 +53,12 @@ def loops(
 @click.command()
 @click.argument("before", type=click.Path(path_type=Path))
 @click.argument("after", type=click.Path(path_type=Path))
-@click.option("--worn", metavar="RECTANGLE", help="Where, from the middle: XMIN,XMAX,YMIN,YMAX.")
-@click.option("--bare", nargs=3, metavar="UNIT DX DY", help="Of scans that do not say theirs.")
+@click.option(
+    "--worn", metavar="RECTANGLE", help="Worn area, from the middle: XMIN,XMAX,YMIN,YMAX."
+)
+@click.option(
+    "--bare", nargs=3, metavar="UNIT DX DY", help="Unit and pitch of scans that do not state them."
+)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for table, map and figure.")
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
 def scar(before: Path, after: Path, out: Path | None, force: bool, **given: Any) -> None:

@@ -136,7 +136,7 @@ def test_new_analysis_that_keeps_nothing_is_not_resumed(ball: Path, tmp_path: Pa
     (out / "summary.json").unlink()
     refused = invoke("resume", out)
     assert refused.exit_code == 2
-    assert "takes up no run half done; start it again with `fretscale run" in refused.stderr
+    assert "cannot continue a half-done run; start it again with `fretscale run" in refused.stderr
 
 
 @pytest.mark.parametrize(("value", "code", "verdict"), [(RADIUS, 0, "met"), (0.3, 1, "MISSED")])
@@ -154,7 +154,7 @@ def test_new_analysis_is_verified(ball, tmp_path, value, code, verdict):
 def test_new_analysis_without_ladders_is_not_charted(ball: Path, tmp_path: Path) -> None:
     refused = invoke("chart", ball, "--out", tmp_path / "chart")
     assert refused.exit_code == 2
-    assert "nothing of a case of this kind can be charted" in refused.stderr
+    assert "a case of this kind has nothing to chart" in refused.stderr
 
 
 def test_new_analysis_has_no_structure_to_take_loads_from(ball: Path, tmp_path: Path) -> None:

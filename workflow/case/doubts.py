@@ -143,8 +143,8 @@ def _hardly_round(section: BaseModel, path: str = "") -> Iterator[str]:
         if width is not None and radius is not None and 0.5 * width**2 / radius < ROUND:
             yield (
                 f"{path}{name}_radius: {plain(radius, 'mm')} over {name}_width "
-                f"{plain(width, 'mm')} falls off by {plain(0.5 * width**2 / radius, 'mm', 3)}: "
-                "are the units right?"
+                f"{plain(width, 'mm')} gives a rounding only "
+                f"{plain(0.5 * width**2 / radius, 'mm', 3)} deep: are the units right?"
             )
     for name in type(section).model_fields:
         value = getattr(section, name)
@@ -188,8 +188,8 @@ def uneven_cells(sides: tuple[float, float], cells: tuple[int, int]) -> Iterator
     ratio = max(dx / dy, dy / dx)
     if ratio > SQUARE:
         yield (
-            f"contact.grid: cells of {plain(dx, 'mm', 4)} x {plain(dy, 'mm', 4)}, "
-            f"{ratio:.0f} times longer than wide; usual: nearly square"
+            f"contact.grid: cells of {plain(dx, 'mm', 4)} x {plain(dy, 'mm', 4)} are {ratio:.0f} "
+            "times longer than wide; usual: nearly square"
         )
 
 
@@ -201,17 +201,20 @@ def pressed(
     If no yield stress is known, Young's ``moduli`` [MPa] give the limit.
     """
     if 0.0 < pressure < WEAK:
-        yield f"{path}: presses with about {plain(pressure, 'MPa', 3)} at most: is its unit right?"
+        yield (
+            f"{path}: gives a pressure of only about {plain(pressure, 'MPa', 3)}: is its unit "
+            "right?"
+        )
     limits = [limit for limit in yields if limit is not None]
     if limits and pressure > BEYOND * min(limits):
         yield (
-            f"{path}: presses with about {plain(pressure, 'MPa', 3)}, "
+            f"{path}: gives a pressure of about {plain(pressure, 'MPa', 3)}, "
             f"{pressure / min(limits):.0f} times the yield stress: is its unit right?"
         )
     elif pressure > STRENGTH * min(moduli, default=np.inf):
         yield (
-            f"{path}: presses with about {plain(pressure, 'MPa', 3)}, more than any material with "
-            "such a Young's modulus bears: is its unit right?"
+            f"{path}: gives a pressure of about {plain(pressure, 'MPa', 3)}, more than any "
+            "material with such a Young's modulus bears: is its unit right?"
         )
 
 
@@ -231,8 +234,8 @@ def long_stroke(path: str, stroke: float, width: float) -> Iterator[str]:
     """Yield a warning if the stroke [mm] is very large compared with the contact ``width`` [mm]."""
     if stroke > LONG * width:
         yield (
-            f"{path}: {plain(stroke, 'mm')}, {stroke / width:.0f} times the width of the contact, "
-            f"about {plain(width, 'mm', 3)}: is its unit right?"
+            f"{path}: {plain(stroke, 'mm')} is {stroke / width:.0f} times the width of the "
+            f"contact, about {plain(width, 'mm', 3)}: is its unit right?"
         )
 
 
@@ -246,7 +249,7 @@ def heights(path: str, values: Array, sides: tuple[float, float]) -> Iterator[st
     else:
         return
     yield (
-        f"{path}: heights over {plain(reach, 'mm', 3)} on {plain(min(sides), 'mm')}; "
+        f"{path}: heights over {plain(reach, 'mm', 3)} on a face of {plain(min(sides), 'mm')}; "
         f"they are read in mm: are they in {other}?"
     )
 
@@ -254,4 +257,7 @@ def heights(path: str, values: Array, sides: tuple[float, float]) -> Iterator[st
 def idle_steps(path: str, step: float | None, cycles: float) -> Iterator[str]:
     """Yield a warning if the wear step has more cycles than the whole run."""
     if step is not None and step > cycles:
-        yield f"{path}: {step:g} cycles, of {cycles:g} in all: one jump; usual: ten or more"
+        yield (
+            f"{path}: {step:g} cycles, but the run has {cycles:g}: it makes one jump; usual: ten "
+            "or more"
+        )

@@ -88,7 +88,7 @@ class CaseFile(File):
     @property
     def allowed(self) -> str:
         others = "".join(f" or a file {ending}" for ending in self.endings if ending != YAML)
-        return f"a case of {self.what}{others}, as seen from the folder of the case"
+        return f"a case of {self.what}{others}, with its path from the folder of the case"
 
     def parse(self, value: object, context: Mapping[str, Any] = NO_CONTEXT) -> str:
         path = super().parse(value, context)
@@ -133,8 +133,8 @@ def check_command(source: Source, command: str) -> None:
     taken_by = next((word for word, key in KNOWN_BY.items() if source.at((key,)) is not None), None)
     if taken_by is not None and taken_by != command:
         raise OtherKind(
-            f"{source.name}: a {taken_by.replace('run', 'case')}; "
-            f"run it with `fretscale {taken_by} {source.name} --out DIR`"
+            f"{source.name}: this is a {taken_by.replace('run', 'case')}; run it with `fretscale "
+            f"{taken_by} {source.name} --out DIR`"
         )
 
 

@@ -54,7 +54,7 @@ MATERIALS = {
         ("IN718", "Alloy 718", "2.4668"),
     ),
     "100Cr6": KnownMaterial(
-        *(210.0, 0.3, 7830, None, "hardened; yield stress left to you"),
+        *(210.0, 0.3, 7830, None, "hardened; give the yield stress yourself"),
         "Lucefin, technical card 100Cr6 to EN ISO 683-17 (elasticity); balls of AISI 52100, "
         "0.283 lb/in^3 (density)",
         ("52100", "AISI 52100", "SUJ2", "1.3505"),

@@ -134,11 +134,11 @@ class ElasticSection(Section):
     """Base of the materials of a case: given by name, by numbers, or both."""
 
     refused: ClassVar[Mapping[str, str]] = {
-        "density": "no mass is moved here; allowed: leave it out"
+        "density": "nothing here depends on mass; allowed: leave it out"
     }
 
     material: Annotated[str, MaterialName()] | None = entry(
-        "one of `fretscale materials`, for all that is not given beside it",
+        "one of `fretscale materials`, for all properties that are not given here",
         "Ti-6Al-4V",
         default=None,
     )
@@ -157,8 +157,8 @@ class ElasticSection(Section):
             meant = near(str(name))
             hint = f", did you mean '{meant}'?" if meant else ""
             raise disagreement(
-                f"{shown(name)}: no known material{hint}; allowed: {MaterialName.allowed}, or "
-                "a section with young and poisson",
+                f"{shown(name)}: unknown material{hint}; allowed: {MaterialName.allowed}, or a "
+                "section with young and poisson",
                 *(["material"] if "material" in given else []),
             )
         known = MATERIALS[name].in_base_units().items()
@@ -200,7 +200,7 @@ class Output(Section):
     figures: Annotated[bool | tuple[str, ...], Formats(FIGURE_FORMATS)] = entry(
         "charts: true (png), false, or one or a list of png, svg and pdf", True, default=True
     )
-    report: StrictBool = entry("report.html: all of it on one page", True, default=True)
+    report: StrictBool = entry("report.html: everything on one page", True, default=True)
 
     @property
     def figure_formats(self) -> tuple[str, ...]:
@@ -213,21 +213,21 @@ class Output(Section):
 class Expectation(Section):
     """Value that the run must reproduce, checked by ``fretscale verify``."""
 
-    quantity: DottedPath = entry("path into summary.json", "intrados.depth")
+    quantity: DottedPath = entry("path in summary.json", "intrados.depth")
     value: Annotated[float, Quantity(None)] = entry(
-        "with its unit, which `verify` shows; a bare number is in base units", "12 um"
+        "value with its unit, in which `verify` shows it; a bare number is in base units", "12 um"
     )
     tolerance: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] = entry(
-        "relative to the value; of a value 0 in its unit [1]", "1 %"
+        "tolerance relative to the value; for a value 0 in its unit [1]", "1 %"
     )
     kind: Literal["printed", "closed_form", "independent", "earlier"] = entry(
         "printed (by a publication, in numbers or words), closed_form (a formula, a balance or a "
-        "limit), independent (another method) or earlier (our own result, against change)",
+        "limit), independent (another method) or earlier (our own result, to detect changes)",
         "closed_form",
     )
-    source: Title = entry("which publication, formula, method or run", "V = α µ P 2s N")
+    source: Title = entry("publication, formula, method or run", "V = α µ P 2s N")
     exact: StrictBool = entry(
-        "whether finer and finer grids go to the value, to all digits given: what `chart` needs",
+        "whether finer grids converge to the value, to all digits given: `chart` needs it",
         False,
         default=False,
     )
@@ -236,9 +236,9 @@ class Expectation(Section):
 class MeasuredHeadings(Section):
     """Headings of a measured table, without their units."""
 
-    at: Title | None = entry("of what the curve goes along, if not at", "energy", default=None)
+    at: Title | None = entry("heading of the places, if not at", "energy", default=None)
     values: Title | None = entry(
-        "of what was measured, if not values; with _deviation at its end, of its deviations",
+        "heading of the measured values, if not values; with _deviation added, of their deviations",
         "mu",
         default=None,
     )
@@ -253,28 +253,27 @@ class Measured(Section):
     also_filled_in: ClassVar[tuple[str, ...]] = "at", "values"
 
     curve: Title = entry(
-        "its title, as `fretscale compare` draws it; its beginning where there is one such curve",
+        "title of the curve, as `fretscale compare` draws it; its beginning is enough if "
+        "there is only one such curve",
         "friction of the joint",
     )
     file: Annotated[str, File((".csv",))] | None = entry(
-        "instead of at and values: CSV, headings with units, as seen from the folder of the case",
+        "CSV instead of at and values: headings with units, path from the folder of the case",
         "measured.csv",
         default=None,
     )
     columns: MeasuredHeadings = entry("headings of the file", default=MeasuredHeadings())
-    at: MeasuredNumbers = entry(
-        "where, with units, in place of a file", ["0 J", "2 kJ"], default=()
-    )
-    values: MeasuredNumbers = entry("what was measured there", [0.34, 0.37], default=())
+    at: MeasuredNumbers = entry("places with units, instead of a file", ["0 J", "2 kJ"], default=())
+    values: MeasuredNumbers = entry("measured values there", [0.34, 0.37], default=())
     deviation: Annotated[float, Quantity(None, above=0.0)] | None = entry(
-        "standard deviation of every value, with its unit; without one there is no chi²",
+        "standard deviation of every value, with its unit; without it there is no chi²",
         0.02,
         default=None,
     )
     relative_deviation: Annotated[float, Quantity("1", above=0.0, at_most=10.0)] | None = entry(
-        "instead of deviation: as a share of each value [1]", "5 %", default=None
+        "deviation as a share of each value, instead of deviation [1]", "5 %", default=None
     )
-    source: Title = entry("who measured it, and where it is printed", "Li 2020, fig. 15")
+    source: Title = entry("author and publication", "Li 2020, fig. 15")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -285,16 +284,18 @@ class Measured(Section):
                 f"{len(self.values)} for {len(self.at)} places; allowed: as many as in at", "values"
             )
         if self.deviation is not None and self.relative_deviation is not None:
-            raise disagreement("given beside deviation; allowed: one of them", "relative_deviation")
+            raise disagreement("given with deviation; allowed: one of them", "relative_deviation")
         if self.relative_deviation is not None and 0.0 in self.values:
-            raise disagreement("a share of 0 is none; allowed: deviation", "relative_deviation")
+            raise disagreement(
+                "a share of 0 means nothing; allowed: deviation", "relative_deviation"
+            )
         return self
 
 
 class OutputWithoutFields(Output):
     """Files that are written in addition to summary and results, for a case without fields."""
 
-    paraview: StrictBool = entry("files for ParaView: there are none", False, default=False)
+    paraview: StrictBool = entry("files for ParaView: this case has none", False, default=False)
 
     @field_validator("paraview")
     @classmethod
@@ -325,16 +326,16 @@ class Case(Section, ABC):
     about: ClassVar[str]
 
     title: Title = entry("one line", "Ball on a flat, pressed and sheared")
-    analysis: str = entry("what is computed", "contact")
-    structure: Section = entry("what is loaded")
-    output: Output = entry("files beside summary and results", default=Output())
+    analysis: str = entry("kind of analysis", "contact")
+    structure: Section = entry("loaded structure")
+    output: Output = entry("files written with summary and results", default=Output())
     assumed: tuple[DottedPath, ...] = entry(
-        "inputs that are ours because the source does not print them",
+        "inputs that are assumed because the source does not print them",
         ["structure"],
         default=(),
     )
     measured: tuple[Measured, ...] = entry(
-        "points to be shown beside curves of the results", default=()
+        "measured points to show with curves of the results", default=()
     )
     expect: tuple[Expectation, ...] = entry("values the run must reproduce", default=())
 

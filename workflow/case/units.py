@@ -120,7 +120,7 @@ def to_base(text: str, unit: str | None) -> float:
     wanted = _parse(unit)
     if known.powers != wanted.powers:
         target = "a ratio" if unit == "1" else unit
-        hint = "; all that is below / needs brackets" if BELOW.search(written) else ""
+        hint = "; use brackets for all that is below /" if BELOW.search(written) else ""
         raise UnitError(f"unit '{written}' cannot be converted to {target}{hint}")
     return float(number * known.factor / wanted.factor)
 

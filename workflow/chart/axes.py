@@ -55,7 +55,7 @@ def axes_of(
             offered = ", ".join(axis.name for axis in applying(AXES))
             raise UserError(f"--axis {name}: {wrong}; allowed: {offered or 'none'}")
     if not wanted:
-        raise UserError(f"{case}: nothing of a case of this kind can be charted")
+        raise UserError(f"{case}: a case of this kind has nothing to chart")
     return wanted
 
 

@@ -66,7 +66,9 @@ def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
 def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
     """Draw error against seconds and against convolutions, with a line for each branch."""
     chosen = ladder.cheapest(accuracy)
-    ending = "none is known to be enough" if chosen is None else f"{chosen.name} is enough"
+    ending = (
+        "no rung is known to be sufficient" if chosen is None else f"{chosen.name} is sufficient"
+    )
     title = f"{ladder.axis.name}: {ladder.axis.what}; for {100 * accuracy:g} % {ending}"
     figure = new_figure(title, HEIGHT)
     bottom = _bottom([ladder])
@@ -208,7 +210,9 @@ def _draw_floor(axis: Axes, ladder: Ladder) -> None:
     if ladder.floor > 0.0 and isfinite(ladder.floor):
         axis.axhspan(0.0, ladder.floor, color=ORANGE, alpha=0.12, lw=0, zorder=0)
         axis.axhline(ladder.floor, color=ORANGE, lw=0.8, alpha=0.6)
-        axis.plot([], [], "-", color=ORANGE, alpha=0.3, lw=8, label="references not known better")
+        axis.plot(
+            [], [], "-", color=ORANGE, alpha=0.3, lw=8, label="reference not known more accurately"
+        )
 
 
 def _draw_quantities(axis: Axes, ladder: Ladder, cost: str) -> None:

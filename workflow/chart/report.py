@@ -55,8 +55,8 @@ def _choice(ladder: Ladder, accuracy: float) -> str:
     if best is None:
         return f"{name}: nothing ran"
     return (
-        f"{name}: for {wanted} no rung is known to be enough: the best, {best.name}, is within "
-        f"{percent(best.bound)} ({_costs(best)})"
+        f"{name}: for {wanted} no rung is known to be sufficient: the best, {best.name}, is "
+        f"within {percent(best.bound)} ({_costs(best)})"
     )
 
 
@@ -86,14 +86,14 @@ def _together(chart: Chart) -> str:
     best = combination(chart)
     if best is None:
         return (
-            f"all axes: for {percent(chart.accuracy)} no choice of rungs is known to be enough: "
-            "their errors, each axis varied alone, add up to more"
+            f"all axes: for {percent(chart.accuracy)} no choice of rungs is known to be "
+            "sufficient, because their errors, each axis varied alone, add up to more"
         )
     choice = ", ".join(f"{axis} {rung}" for axis, rung in best.rungs.items())
     return (
         f"all axes: for {percent(chart.accuracy)} take {choice}: errors, each axis varied alone, "
-        f"add up to {percent(best.error)} at most, and about {best.seconds_ratio:.2g} times the "
-        "seconds of the case as written"
+        f"add up to at most {percent(best.error)}, and a run takes about {best.seconds_ratio:.2g} "
+        "times the seconds of the case as written"
     )
 
 
@@ -133,7 +133,7 @@ def _table(ladder: Ladder) -> Table:
 def _reference(ladder: Ladder) -> str:
     """Return how accurately the references are known, for a title."""
     if ladder.references and not isfinite(ladder.floor):
-        return " (nothing to hold the rungs against)"
+        return " (no reference to compare the rungs with)"
     if ladder.axis.order is None or not ladder.references:
         return ""
     known = ladder.references.values()

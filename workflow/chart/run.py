@@ -106,7 +106,7 @@ def chart_case(
     jobs = _jobs(case, base, settings)
     folder = OutputFolder(out, KIND)
     _claim(folder, written)
-    log = folder.reserve(LOG, "what it said, and when")
+    log = folder.reserve(LOG, "messages of the chart, with times")
     with (
         environment({CACHE: str((out / STRUCTURES).absolute())}),
         closing(Reporter(log, True, loudness=loudness)) as reporter,
@@ -115,7 +115,7 @@ def chart_case(
         ended, left_out = _run(jobs, settings, out / RUNS, quantities, reporter)
     runs = _runs(ended)
     if not runs:
-        raise MethodFailed(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
+        raise MethodFailed(f"{out}: no rung ran: {ended[0].job.name}: {ended[0].error}")
     failed = {end.job.name: end.error for end in ended if end.summary is None}
     ladders = []
     for axis, of_axis in settings.items():

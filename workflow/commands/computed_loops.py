@@ -41,9 +41,9 @@ def report_of_loops(loops: h5py.Group) -> list[str]:
     """Return a row for each loop in the group of loops; raise UserError for too few increments."""
     return [
         *(line for name, group in loops.items() for line in _rows(name, group)),
-        "kt is the slope right after a reversal, as of measured loops; stuck is that of the "
-        "contact with all stuck, +- what the grid leaves of it",
-        "mu in brackets is only what is mobilised: these loops do not slide",
+        "kt is the slope right after a reversal, as for measured loops; stuck is that of the "
+        "fully stuck contact, +- the error due to the grid",
+        "mu in brackets is only a lower bound: these loops do not slide",
     ]
 
 
@@ -54,12 +54,14 @@ def _rows(name: str, group: h5py.Group) -> Iterator[str]:
     for jump, kept in group.items():
         values = kept.attrs
         if "kt_error" not in values:
-            raise UserError(f"loops of {name}: of an earlier version; allowed: those of a new run")
+            raise UserError(
+                f"loops of {name}: written by an earlier version; allowed: those of a new run"
+            )
         try:
             loops = measure_loops(kept["displacement"][()], kept["force"][()], float(values["P"]))
         except MeasuredLoopError as error:
             raise UserError(
-                f"loops of {name}, jump {int(jump)}: {error}; or more loops.increments of the case"
+                f"loops of {name}, jump {int(jump)}: {error}; or more loops.increments in the case"
             ) from error
         kt = 1e-3 * loops.stick_estimate.value
         stuck, off = (1e-3 * float(values[key]) for key in ("kt", "kt_error"))

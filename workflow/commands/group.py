@@ -19,14 +19,14 @@ from sa_solver.errors import FretscaleError
 from workflow import errors
 
 # How to continue a command that was stopped.
-ADVICE = "a run continues with `fretscale resume DIR`, many with the same command"
+ADVICE = "continue a run with `fretscale resume DIR`, several with the same command"
 # Commands in the order and groups of the help.
 LISTED = {
     "A case": ("new", "check", "run", "resume"),
-    "What came out": ("report", "compare"),
+    "Results": ("report", "compare"),
     "Many runs": ("sweep", "chart", "verify"),
     "Input and output": ("materials", "describe", "resultants", "surface", "schema"),
-    "What was measured": ("loops", "scar", "fit"),
+    "Measurements": ("loops", "scar", "fit"),
 }
 
 

@@ -18,6 +18,7 @@ from wear.joints.measured.measured_loops import (
 )
 from workflow.analyses.wear.output.loop_table import write_loop_table
 from workflow.case.files.loop_file import BASE_UNITS, account, read_loop_file
+from workflow.case.text.readable import percent
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.shell.folders.folder import OutputFolder
@@ -96,9 +97,7 @@ def report(loops: MeasuredLoops) -> list[str]:
         rows += _means(steps[number], list(columns), str(number + 1) if many else "")
     lines = ["".join(f"{cell:>{WIDTH}}" for cell in row) for row in rows]
     if max(len(loops.energy), len(steps)) > MOST_ROWS:
-        lines.append(
-            f"{MOST_ROWS} rows at most are shown; the table that --out writes has all loops"
-        )
+        lines.append(f"only {MOST_ROWS} rows are shown; the table that --out writes has all loops")
     return [*lines, *_notes(loops)]
 
 
@@ -177,29 +176,28 @@ def _notes(loops: MeasuredLoops) -> list[str]:
     notes = [account(loops), "kt is the slope right after a reversal, residual stiffness included"]
     if count > 1:
         notes.append(
-            f"{count} steps of loops that are alike in stroke, force and load; there is no mean of "
-            "all"
+            f"{count} steps of loops that agree in stroke, force and load; they have no common mean"
         )
     if np.isnan(loops.stick_stiffness).any():
         notes.append(
-            "kt: not known where fewer than 4 samples lie between a reversal and half of the "
+            "kt: unknown where fewer than 4 samples lie between a reversal and half of the "
             "loop's height; a fit of joint_law finds it from whole loops"
         )
     if loops.sliding.any():
         shares = np.unique(loops.sliding[loops.sliding > 0.0])
-        least, most = f"{shares[0]:.0%}", f"{shares[-1]:.0%}"
+        least, most = f"{percent(shares[0])}", f"{percent(shares[-1])}"
         notes.append(
             f"the last {least if least == most else f'{least} to {most}'} of the branches slide: "
             "kr is their slope, mu half their distance over the normal load"
         )
     if not loops.slides:
         notes.append(
-            f"no sliding branch{f' at {_strokes(loops)}' if loops.sliding.any() else ''}: half the "
-            "force range over the normal load is a lower bound of mu, and kr is not known; a "
-            "larger stroke would show both"
+            f"no sliding branch{f' at {_strokes(loops)}' if loops.sliding.any() else ''}: half "
+            "the force range over the normal load is only a lower bound of mu, and kr is "
+            "unknown; a larger stroke would show both"
         )
     if np.isnan(loops.normal_load).any():
-        notes.append("no normal load, so no mu: give --normal-load or a column normal_load")
+        notes.append("no normal load, so mu is unknown: give --normal-load or a column normal_load")
     return notes
 
 

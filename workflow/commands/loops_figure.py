@@ -122,7 +122,7 @@ def _draw_values(axis: Axes, values: Array, label: str, colour: str) -> None:
 
 def _title(loops: MeasuredLoops, name: str) -> str:
     if (steps := int(loops.step[-1]) + 1) > 1:
-        return f"{name}: {len(loops.energy)} loops in {steps} steps of like ones"
+        return f"{name}: {len(loops.energy)} loops in {steps} steps of similar ones"
     values, label = _friction(loops)
     stick = PER_MICRON * loops.stick_estimate.value
     called, _, unit = label.partition(" [")

@@ -63,8 +63,8 @@ class _Offered:
 
     def offer(self) -> Offer:
         lines = [
-            f"# What {Path(self.file).name} says, by `fretscale describe`: look at every entry,",
-            f"# and give what says {TO_FILL!r}. `fretscale check` tells what is wrong or missing.",
+            f"# What {Path(self.file).name} contains, by `fretscale describe`: check every entry,",
+            f"# and replace {TO_FILL!r}. `fretscale check` lists what is wrong or missing.",
             f"# Lengths of the file are {self.imported.unit}, {self._forces}",
             f"title: {_text('Bodies of ' + Path(self.file).name)}",
             "analysis: wear",

@@ -13,6 +13,7 @@ from wear.scar import Scar, measure_scar
 from workflow.case.files.input_files import InputFileError
 from workflow.case.files.scan_files import NEAR, UNITS, read_scan
 from workflow.case.text.plain import plain
+from workflow.case.text.readable import percent
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.shell.folders.folder import OutputFolder
@@ -87,8 +88,8 @@ def report(scar: Scar) -> list[str]:
     volume, deepest = PER_MICRON * scar.volume, TO_MICRONS * scar.deepest
     if scar.volume_error is None or scar.depth_error is None:
         lines = [
-            f"volume   {volume:.4g} um^3 ({scar.volume:.4g} mm^3), its error unknown",
-            f"deepest  {deepest:.4g} um {mean}, its error unknown",
+            f"volume   {volume:.4g} um^3 ({scar.volume:.4g} mm^3), error unknown",
+            f"deepest  {deepest:.4g} um {mean}, error unknown",
         ]
     else:
         lines = [
@@ -98,43 +99,45 @@ def report(scar: Scar) -> list[str]:
         ]
     lines.append(f"area     {scar.area:.4g} mm^2")
     if scar.length is None or scar.patches is None:
-        lines.append("rim      no noise at all")
+        lines.append("rim      without noise")
     else:
         lines.append(
             f"rim      {plain(scar.noise, 'mm', 3)} rms, correlated over "
             f"{plain(scar.length, 'mm', 3)}: {scar.patches:.0f} independent patches"
         )
     if scar.shift is None:
-        lines.append(
-            "the rims have no roughness in common: laid over each other by their plane alone"
-        )
+        lines.append("the rims have no common roughness: they are aligned only by their planes")
     else:
         errors = [f" +- {plain(error, 'mm', 2)}" for error in scar.shift_error or ()] or ["", ""]
         x, y = (
             f"{plain(by, 'mm', 4)}{error}" for by, error in zip(scar.shift, errors, strict=True)
         )
-        lines.append(f"laid over each other: the second lies {x}, {y} off the first")
+        lines.append(f"aligned: the second lies {x}, {y} off the first")
     if scar.missing:
-        lines.append(f"{scar.missing:.1%} of the worn area are missing points, laid in between")
+        lines.append(
+            f"{percent(scar.missing)} of the worn area are missing points, which are filled in"
+        )
     return [*lines, *_doubts(scar)]
 
 
 def _doubts(scar: Scar) -> list[str]:
     doubts = []
     if (step := min(scar.pitch)) < NEAR:
-        doubts.append(f"doubt: points {plain(step, 'mm', 3)} apart: is their unit right?")
+        doubts.append(f"warning: points {plain(step, 'mm', 3)} apart: is their unit right?")
     if scar.patches is None:
         doubts.append(
-            "doubt: both scans are the same around the worn area, to the last digit, as no two "
-            "measurements are: no error can be told; are they one file, damaged, or computed?"
+            "warning: both scans agree around the worn area to the last digit, as no two "
+            "measurements do, so the error is unknown: are they one file, damaged, or computed?"
         )
     elif not scar.sure:
         doubts.append(
-            "doubt: the noise is correlated over so much of the rim that it is hardly known: "
-            "the errors are about right at best; scans that reach farther tell more"
+            "warning: the noise is correlated over so much of the rim that the errors are rough "
+            "at best: take scans that reach farther"
         )
     if scar.volume <= (scar.volume_error or 0.0):
-        doubts.append("doubt: no volume that differs from none; are the files in order?")
+        doubts.append(
+            "warning: the volume does not differ from none: are the files in the right order?"
+        )
     return doubts
 
 

@@ -108,7 +108,7 @@ def compare(folders: Sequence[str | Path]) -> ComparedRuns:
     for run in runs[1:]:
         if analysis_of(run.run.case) is not analysis:
             raise UserError(
-                f"{run.folder}: a run of a {run.run.kind} case, where that in {paths[0]} is of a "
+                f"{run.folder}: a run of a {run.run.kind} case, but that in {paths[0]} is of a "
                 f"{first.kind} case; allowed: {', '.join(analysis.cases)}"
             )
     return ComparedRuns(analysis, runs, _rows(analysis, told), _entries(told))

@@ -35,8 +35,8 @@ from workflow.shell.output.tables import write_table
 # Mark of a difference that exceeds both estimated errors.
 BEYOND = "!"
 MEANING = (
-    f"{BEYOND} marks differences to the first run that are more than the estimated errors of both "
-    "together; where one of them is not known, nothing is marked."
+    f"{BEYOND} marks differences from the first run that exceed the estimated errors of both "
+    "together; where an error is unknown, nothing is marked."
 )
 # Ratios beyond LARGE are shown as a factor of two digits, not in per cent.
 LARGE, FACTOR_DIGITS = 5.0, 0.05
@@ -130,7 +130,7 @@ def columns_of(comparison: ComparedRuns) -> dict[str, list[Any]]:
         columns[f"{name}, estimated error"] = [row.errors[number] for row in rows]
         if number:
             columns[f"{name}, difference"] = [row.difference(number) for row in rows]
-            columns[f"{name}, beyond errors"] = [row.beyond(number) for row in rows]
+            columns[f"{name}, exceeds errors"] = [row.beyond(number) for row in rows]
     return columns
 
 
@@ -143,12 +143,12 @@ def comparison_page(comparison: ComparedRuns, figures: dict[str, str]) -> str:
     pictures = [picture(svg, title, captioned=False) for title, svg in figures.items()]
     parts = [
         section("The runs", _runs(comparison)),
-        section("What differs in their cases", _entries(comparison)),
+        section("Differences of their cases", _entries(comparison)),
         section("Results", _results(comparison), note(MEANING)),
         section("Curves", element("div", *pictures, cls="small") if pictures else ""),
     ]
     title = " and ".join(names) if len(names) == 2 else f"{len(names)} runs side by side"
-    lead = f"{len(names)} runs compared; what the others are held against "
+    lead = f"{len(names)} runs compared; the reference "
     header = element(
         "header",
         element("h1", title),
@@ -171,7 +171,7 @@ def _runs(comparison: ComparedRuns) -> Html:
 
 def _entries(comparison: ComparedRuns) -> Html:
     if not comparison.entries:
-        return element("p", "Nothing that results depend on.")
+        return element("p", "Nothing that affects results.")
     rows = [[code(path), *map(given, texts)] for path, texts in comparison.entries.items()]
     return table(["", *comparison.names], rows)
 

@@ -181,7 +181,7 @@ def solved(
         where = f" ({named})" if named else ""
         doubts.append(": ".join(part for part in (doubt.series, doubt.text + where) if part))
     doubts += [
-        f"{parameter.path}: rests on one value, {places[e.heaviest]}; more there would tell"
+        f"{parameter.path}: rests on one value, {places[e.heaviest]}; more there would help"
         for parameter in parameters
         if (e := parameter.estimate).determined and e.heaviest_share > ALONE
     ]
@@ -189,7 +189,7 @@ def solved(
     if fitted.reached < fitted.tried:
         doubts.append(
             f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit; the "
-            "best of all is told"
+            "best one is reported"
         )
     tests = _tests(fitted, parameters, series, files)
     found = Fitted(given, fitted, parameters, tuple(series), tuple(doubts), tests, tuple(told))
@@ -225,9 +225,9 @@ def _contradictions(fitted: Fitted) -> list[str]:
                 if np.isfinite(own)
             )
             told.append(
-                f"{path}: the files contradict each other beyond their scatter ({values}"
-                f"{'' if unit == '1' else f' {unit}'}): bounds of a common value are too small; "
-                "fit them apart, or ask what the tests differ in"
+                f"{path}: the files contradict each other beyond their scatter "
+                f"({values}{'' if unit == '1' else f' {unit}'}), so bounds of a common value are "
+                "too small: fit them separately, or ask what the tests differ in"
             )
     return told
 
@@ -270,11 +270,11 @@ def fit_joint(given: FitInput, file: JointFit) -> Fitted:
             place = given.source.where(("evolution", name))[1]
             raise CaseError(
                 f"{place}: evolution.{name}: no file has its column {MEASURED[name]}; allowed: "
-                "one that has, or columns that names it"
+                "one that has it, or columns that names it"
             )
     columns, notes = _without_residual(file, columns)
     notes += [
-        f"{name}: left out where loops do not slide as a whole ({_named(column.left_out)})"
+        f"{name}: not used where loops do not slide as a whole ({_named(column.left_out)})"
         for name, column in columns.items()
         if column.left_out
     ]
@@ -336,8 +336,8 @@ def _without_residual(
     residual = kt.others.get("residual_stiffness")
     if residual is None:
         note = (
-            f"kt has no residual_stiffness beside it and is taken for the stiffness of {file.law} "
-            "as it is: right where nothing of it is left when all slides"
+            f"kt has no residual_stiffness and is taken as the whole stiffness of {file.law}: "
+            "right if nothing of it is left when all slides"
         )
         return columns, [note]
     alone = MeasuredColumn(
@@ -354,7 +354,7 @@ def fit_wear(given: FitInput, file: WearFit) -> Fitted:
     columns = read_columns(file.measurements, list(VOLUMES), beside=("amplitude",))
     if "volume" in columns and len(columns) > 1:
         raise UserError(
-            f"{given.name}: volume beside volume_1 or volume_2; allowed: that of both bodies, or "
+            f"{given.name}: volume and volume_1 or volume_2; allowed: that of both bodies, or "
             "those of each"
         )
     reference = file.wear.reference_amplitude

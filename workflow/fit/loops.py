@@ -80,7 +80,8 @@ def _doubts(measured: MeasuredLoops, fitted: int) -> list[str]:
     steps, doubts = measured.steps, []
     if fitted < len(steps):
         doubts.append(
-            f"{fitted} of {len(steps)} steps of like loops are fitted, from the first to the last"
+            f"{fitted} of {len(steps)} steps of similar loops are fitted, from the first to "
+            "the last"
         )
     strokes = np.array([step.stroke.mean() for step in steps])
     forces = np.array([step.force.mean() for step in steps])
@@ -93,8 +94,8 @@ def _doubts(measured: MeasuredLoops, fitted: int) -> list[str]:
         last = first + 1 + int(np.flatnonzero(same)[-1]) - first
         doubts.append(
             f"loops of one stroke change, from {forces[first]:.4g} N and {energies[first]:.4g} mJ "
-            f"to {forces[last]:.4g} N and {energies[last]:.4g} mJ: the joint wears or runs in, and "
-            "one law is a mean of its states; fit parts of the record apart"
+            f"to {forces[last]:.4g} N and {energies[last]:.4g} mJ: the joint wears or runs in, "
+            "and one law is a mean of its states; fit parts of the record separately"
         )
     return doubts
 

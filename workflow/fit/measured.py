@@ -147,8 +147,8 @@ def _of_sliding(table: TableFile, name: str, part: _Part, slides: Mask) -> _Part
     """Return the rows of loops that slide as a whole; others mobilise only part of the friction."""
     if not slides.any():
         raise InputFileError(
-            f"{table.place}: {name}: no loop slides as a whole (column {SLIDING}), so that it is "
-            "less than the coefficient of friction; allowed: loops of a larger amplitude"
+            f"{table.place}: {name}: no loop slides as a whole (column {SLIDING}), so it is less "
+            "than the coefficient of friction; allowed: loops of a larger amplitude"
         )
     rows = np.flatnonzero(slides)
     return _Part(
@@ -216,7 +216,7 @@ def _deviations(
         return None if given is None else np.full(len(table), given)
     if given is not None:
         raise InputFileError(
-            f"{table.place}: {shown(heading)}: given beside deviations.{name}; allowed: one of them"
+            f"{table.place}: {shown(heading)}: given with deviations.{name}; allowed: one of them"
         )
     unit = QUANTITIES[name].unit
     quantity = Quantity(unit, above=0.0)

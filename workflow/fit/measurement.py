@@ -17,4 +17,4 @@ KIND = "joint_evolution, joint_law, wear_coefficient or wear_profiles"
 class Measurement(Section):
     """Measured table."""
 
-    file: Csv = entry("CSV, headings with units, as seen from this folder", "measured.csv")
+    file: Csv = entry("CSV, headings with units, path from this folder", "measured.csv")

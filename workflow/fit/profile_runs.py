@@ -139,7 +139,7 @@ class TestRuns:
                 raise CaseError(f"{place}: law of {name}; allowed: energy or energy_amplitude")
             if self._file.offset == "threshold" and body.evolution is not None:
                 raise CaseError(
-                    f"{place}: evolution of {name} beside offset: threshold; allowed: one of them"
+                    f"{place}: evolution of {name} with offset: threshold; allowed: one of them"
                 )
         return case
 
@@ -158,8 +158,8 @@ class TestRuns:
         if alike and not _wear_alike(depths, pair):
             raise UserError(
                 f"{self.place(number, 'case')}: the bodies do not wear in proportion to their "
-                "coefficients; allowed: a case of one law for both, in which they hardly move over "
-                "each other (wear.motion: neglect), or depth of both together"
+                "coefficients; allowed: a case of one law for both, in which they hardly move "
+                "over each other (wear.motion: neglect), or depth of both together"
             )
         energy = float(summary[name]["energy"])
         return RunScar(sum(pair), x, np.asarray(sum(depths)), energy, tuple(summary["warnings"]))

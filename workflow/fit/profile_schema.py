@@ -17,17 +17,23 @@ class ProfileHeadings(Section):
     """Headings of the columns of a file, where they differ from the names here."""
 
     x: Heading | None = entry("place along the contact", "position", default=None)
-    depth: Heading | None = entry("worn off both bodies", "wear", default=None)
-    depth_1: Heading | None = entry("worn off body 1", "flat", default=None)
-    depth_2: Heading | None = entry("worn off body 2", "ball", default=None)
+    depth: Heading | None = entry("depth worn off both bodies", "wear", default=None)
+    depth_1: Heading | None = entry("depth worn off body 1", "flat", default=None)
+    depth_2: Heading | None = entry("depth worn off body 2", "ball", default=None)
 
 
 class ProfileDeviations(Section):
     """Standard deviations of depths; if not given, they are estimated from the residuals."""
 
-    depth: Deviation | None = entry("of both bodies [mm]", "0.2 um", default=None)
-    depth_1: Deviation | None = entry("of body 1 [mm]", "0.2 um", default=None)
-    depth_2: Deviation | None = entry("of body 2 [mm]", "0.2 um", default=None)
+    depth: Deviation | None = entry(
+        "deviation of the depth of both bodies [mm]", "0.2 um", default=None
+    )
+    depth_1: Deviation | None = entry(
+        "deviation of the depth of body 1 [mm]", "0.2 um", default=None
+    )
+    depth_2: Deviation | None = entry(
+        "deviation of the depth of body 2 [mm]", "0.2 um", default=None
+    )
 
 
 class ProfileMeasurement(Measurement):
@@ -37,13 +43,13 @@ class ProfileMeasurement(Measurement):
     """
 
     case: Annotated[str, File((".yaml", ".yml"))] = entry(
-        "the test as a wear case; x is along its x", "test.yaml"
+        "the test as a wear case; its x is that of the profile", "test.yaml"
     )
     interface: Annotated[str, Field(min_length=1)] | None = entry(
-        "which contact of the case, if it has several", "interface", default=None
+        "contact of the case, if it has several", "interface", default=None
     )
     aligned: StrictBool = entry(
-        "x and depth are those of the case: no shift, height and tilt are fitted with it",
+        "x and depth are those of the case: no shift, height and tilt are fitted",
         False,
         default=False,
     )
@@ -60,13 +66,13 @@ class ProfileFit(Section):
     fit: Literal["wear_profiles"] = entry(KIND, "wear_profiles")
     measurements: tuple[ProfileMeasurement, ...] = entry("a table for each profile", min_length=1)
     offset: Literal["none", "threshold"] = entry(
-        "none; threshold: energy before anything wears; tests have dissipated more and less",
+        "none; threshold: energy before anything wears, for tests that dissipated more and less",
         "none",
         default="none",
     )
     finer: dict[str, AnyValue] = entry(
-        "entries of the cases, by their dotted paths, with which the last runs are done once more: "
-        "finer steps and grid, for their error",
+        "entries of the cases, by dotted path, for a repetition of the last runs with finer "
+        "steps and grid, which gives their error",
         {"wear.tolerance": "0.2 %"},
         min_length=1,
     )

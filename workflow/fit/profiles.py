@@ -60,13 +60,13 @@ def fit_profiles(given: FitInput, file: ProfileFit, out: Path | None, loudness: 
     no fit, MethodFailed for a run that fails.
     """
     if out is None:
-        raise UserError(f"{given.name}: a fit through runs keeps them in a folder; allowed: --out")
+        raise UserError(f"{given.name}: a fit through runs stores them in a folder; allowed: --out")
     profiles = list(_profiles(file))
     _check_bodies(given, profiles)
     with locked(out):
         folder = OutputFolder(out, "fit")
         folder.refuse_foreign()
-        log = folder.reserve(LOG, "what it said, and when")
+        log = folder.reserve(LOG, "messages of the runs, with times")
         root = folder.reserve(RUNS, "runs of the cases, each with other coefficients")
         root.mkdir(exist_ok=True)
         with closing(Reporter(log, True, loudness=loudness)) as reporter:
@@ -94,8 +94,8 @@ def _check_bodies(given: FitInput, profiles: Sequence[_Profile]) -> None:
     bodies = {profile.body for profile in profiles}
     if BOTH in bodies and len(bodies) > 1:
         raise UserError(
-            f"{given.name}: depth beside depth_1 or depth_2; allowed: that of both bodies, or "
-            "those of each"
+            f"{given.name}: depth and depth_1 or depth_2; allowed: that of both bodies, or those "
+            "of each"
         )
 
 
@@ -151,8 +151,8 @@ class _Search:
         for body in self._bodies:
             if own[body] <= 0.0:
                 raise CaseError(
-                    f"{self._runs.place(number, 'case')}: wear of {body} is 0; allowed: a "
-                    "coefficient above 0 to begin with"
+                    f"{self._runs.place(number, 'case')}: wear of {body} is 0; allowed: an "
+                    "initial coefficient above 0"
                 )
         return pair
 
@@ -216,17 +216,17 @@ class _Search:
             errors = {"for_want_of_runs": off / size, "by_finer": finer / size}
             numbers[parameter.path] = {name: float(error) for name, error in errors.items()}
             told.append(
-                f"{parameter.path}: off by about {off / size:.2g} for want of runs, and "
-                f"{finer / size:+.2g} with finer ones ({how}), relative; its standard deviation is "
-                f"{deviation / size:.2g}"
+                f"{parameter.path}: has an error of about {off / size:.2g} because runs are few, "
+                f"and changes by {finer / size:+.2g} with finer runs ({how}), relative; its "
+                f"standard deviation is {deviation / size:.2g}"
             )
             if abs(finer) > TOO_COARSE * deviation:
                 doubts.append(
-                    f"{parameter.path}: finer runs move it by {abs(finer) / deviation:.2g} "
-                    "standard deviations, which the bounds do not have; make the cases finer"
+                    f"{parameter.path}: finer runs change it by {abs(finer) / deviation:.2g} "
+                    "standard deviations, which its bounds do not include; make the cases finer"
                 )
         if not settled:
-            doubts.append("the runs have not become enough: leaving one out still changes the fit")
+            doubts.append("runs are too few: leaving one out still changes the fit")
         count = counted(len(self._runs.made), "run")
         return replace(
             fitted,

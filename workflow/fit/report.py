@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from workflow.case.text.plain import counted
+from workflow.case.text.readable import percent
 from workflow.fit.fitting import Fitted, Parameter
 from workflow.fit.section import entries_of, told
 from workflow.shell.folders.versions import versions
@@ -48,7 +49,7 @@ def _decided(fitted: Fitted, parameter: Parameter) -> str:
     names = [series.name for series in fitted.series]
     shares = parameter.estimate.shares.tolist()
     order = sorted(range(len(names)), key=lambda k: -shares[k])
-    return ", ".join(f"{names[k]} {shares[k]:.0%}" for k in order if shares[k] > LITTLE)
+    return ", ".join(f"{names[k]} {percent(shares[k])}" for k in order if shares[k] > LITTLE)
 
 
 def _series(fitted: Fitted) -> list[str]:
@@ -71,7 +72,7 @@ def _tests(fitted: Fitted) -> list[str]:
     lines = []
     for path in fitted.tests:
         files = ", ".join(
-            f"{name} {share:.0%}"
+            f"{name} {percent(share)}"
             + (f" (alone {own:.4g} +- {dev:.2g})" if math.isfinite(own) else "")
             for name, share, own, dev in fitted.shown_tests(path)
         )
@@ -88,18 +89,18 @@ def _scatter(fitted: Fitted, place: int) -> float:
 
 def _notes(fitted: Fitted) -> list[str]:
     found = fitted.fit
-    how = "normal, of the given standard deviations" if found.known else "Student's"
+    how = "normal, with the given standard deviations" if found.known else "Student's"
     lines = [*fitted.told, f"+- is one standard deviation; bounds are {how}"]
     lines += [
-        f"{parameter.path}: the model bends within its bounds, which are those of its profile"
+        f"{parameter.path}: the model is nonlinear within its bounds, which are of its profile"
         for parameter in fitted.parameters
         if parameter.estimate.determined and not parameter.estimate.straight
     ]
     lines += [
-        f"{first} and {second} are correlated by {value:.3f}: neither holds alone"
+        f"{first} and {second} have a correlation of {value:.3f}: neither is determined alone"
         for first, second, value in _close(fitted)
     ]
-    return lines + [f"doubt: {doubt}" for doubt in fitted.doubts]
+    return lines + [f"warning: {doubt}" for doubt in fitted.doubts]
 
 
 def _close(fitted: Fitted) -> list[tuple[str, str, float]]:

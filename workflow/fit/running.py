@@ -18,8 +18,8 @@ from workflow.shell.output.tables import write_table
 from workflow.shell.terminal.screen import Loudness
 
 FILES = {
-    "fit.yaml": "the fit as asked for",
-    "section.yaml": "what was found, as a section of a case",
+    "fit.yaml": "the fit as given",
+    "section.yaml": "the result, as a section of a case",
     "parameters.csv": "parameters with their bounds",
     "data.csv": "data, fitted values and residuals",
     "fit.png": "data, curves with bands, and residuals",
@@ -64,7 +64,7 @@ def write_fit(fitted: Fitted, out: Path, force: bool = False) -> list[Path]:
     with locked(out):
         folder = OutputFolder(out, "fit")
         asked, found, parameters, data, drawn, _ = folder.replace(
-            {**FILES, SUMMARY: "what came out, in numbers"}, force
+            {**FILES, SUMMARY: "the result, in numbers"}, force
         )
         write_text(asked, fitted.given.text)
         write_text(found, section)

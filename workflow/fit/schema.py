@@ -37,7 +37,7 @@ class FreeOr(Entry):
 
     @property
     def allowed(self) -> str:
-        return f"free, or to hold it {self.quantity.allowed}"
+        return f"free, or a value to hold it at: {self.quantity.allowed}"
 
     def parse(self, value: object) -> Any:
         if value == FREE:
@@ -73,7 +73,7 @@ class JointHeadings(Section):
 
     filled_in: ClassVar[bool] = False
 
-    energy: Heading | None = entry("dissipated so far", "E", default=None)
+    energy: Heading | None = entry("energy dissipated so far", "E", default=None)
     mu: Heading | None = entry("friction coefficient", "friction coefficient", default=None)
     kt: Heading | None = entry("stuck slope of the loop", "contact stiffness", default=None)
     residual_stiffness: Heading | None = entry(RESIDUAL, "macroslip slope", default=None)
@@ -86,16 +86,16 @@ class JointDeviations(Section):
     filled_in: ClassVar[bool] = False
 
     mu: Annotated[float, Quantity("1", above=0.0)] | None = entry(
-        "of friction coefficients [1]", 0.01, default=None
+        "deviation of friction coefficients [1]", 0.01, default=None
     )
     kt: Annotated[float, Quantity("N/mm", above=0.0)] | None = entry(
-        "of stuck slopes [N/mm]", "1 N/um", default=None
+        "deviation of stuck slopes [N/mm]", "1 N/um", default=None
     )
     residual_stiffness: Annotated[float, Quantity("N/mm", above=0.0)] | None = entry(
-        "of sliding slopes [N/mm]", "0.05 N/um", default=None
+        "deviation of sliding slopes [N/mm]", "0.05 N/um", default=None
     )
     P: Annotated[float, Quantity("N", above=0.0)] | None = entry(
-        "of normal loads [N]", "5 N", default=None
+        "deviation of normal loads [N]", "5 N", default=None
     )
 
 
@@ -112,13 +112,13 @@ class NewJoint(Section):
     """Joint before it has dissipated any energy."""
 
     normal_load: Annotated[float | Free, _or_free(Preload)] = entry(
-        "that presses the joint [N]", "free", default=FREE
+        "normal load that presses the joint [N]", "free", default=FREE
     )
     friction: Annotated[float | Free, _or_free(Coefficient)] = entry(
         "limit of the friction force over the normal load [1]", "free", default=FREE
     )
     stiffness: Annotated[float | Free, _or_free(JointStiffness)] = entry(
-        "of the stuck joint [N/mm]", "free", default=FREE
+        "stiffness of the stuck joint [N/mm]", "free", default=FREE
     )
     residual_stiffness: Annotated[float | Free, _or_free(ResidualStiffness)] = entry(
         f"{RESIDUAL} [N/mm]", "free", default=FREE
@@ -129,23 +129,23 @@ class FreeLogarithmic(Section):
     """1 + change ln(1 + rate E)."""
 
     kind: Literal["logarithmic"] = entry("1 + change ln(1 + rate E)", "logarithmic")
-    change: FreeChange = entry("of the factor with the logarithm [1]", "free", default=FREE)
-    rate: FreeRate = entry("beside the energy [1/(N*mm)]", "free", default=FREE)
+    change: FreeChange = entry("change of the factor with the logarithm [1]", "free", default=FREE)
+    rate: FreeRate = entry("rate, multiplied by the energy [1/(N*mm)]", "free", default=FREE)
 
 
 class FreeArrhenius(Section):
     """1 + change exp(-scale / E)."""
 
     kind: Literal["arrhenius"] = entry("1 + change exp(-scale / E)", "arrhenius")
-    change: FreeChange = entry("of the factor in the end [1]", "free", default=FREE)
-    scale: FreeScale = entry("energy that it takes [N*mm]", "free", default=FREE)
+    change: FreeChange = entry("change of the factor in the end [1]", "free", default=FREE)
+    scale: FreeScale = entry("energy scale [N*mm]", "free", default=FREE)
 
 
 class FreeLinear(Section):
     """1 + slope E."""
 
     kind: Literal["linear"] = entry("1 + slope E", "linear")
-    slope: FreeSlope = entry("against energy [1/(N*mm)]", "free", default=FREE)
+    slope: FreeSlope = entry("rate against energy [1/(N*mm)]", "free", default=FREE)
 
 
 class FreeExponential(Section):
@@ -155,18 +155,18 @@ class FreeExponential(Section):
         "final + (1 - final) (share exp(-rate E) + (1 - share) exp(-second_rate E))",
         "exponential",
     )
-    final: FreeFinal = entry("in the end [1]", "free", default=FREE)
-    rate: FreeRate = entry("of the first exponential [1/(N*mm)]", "free", default=FREE)
+    final: FreeFinal = entry("factor in the end [1]", "free", default=FREE)
+    rate: FreeRate = entry("rate of the first exponential [1/(N*mm)]", "free", default=FREE)
     share: FreeShare = entry(
-        "of the first exponential: 1, or free with second_rate [1]", 1.0, default=1.0
+        "share of the first exponential: 1, or free with second_rate [1]", 1.0, default=1.0
     )
-    second_rate: FreeRate = entry("of the second exponential [1/(N*mm)]", 0.0, default=0.0)
+    second_rate: FreeRate = entry("rate of the second exponential [1/(N*mm)]", 0.0, default=0.0)
 
     @model_validator(mode="after")
     def _two_exponentials_or_one(self) -> FreeExponential:
         if self.share == 1.0 and self.second_rate != 0.0:
             raise disagreement(
-                "a second exponential with a share of nothing; allowed: share: free, or below 1",
+                "a second exponential with a share of 0; allowed: share: free, or below 1",
                 *("share", "second_rate"),
             )
         return self
@@ -180,10 +180,10 @@ FreeFactor = Annotated[
 class FreeEvolution(Section):
     """Factors of the joint's parameters against the energy E that it has dissipated so far."""
 
-    friction: FreeFactor | None = entry("of mu", default=None)
-    stiffness: FreeFactor | None = entry("of kt", default=None)
-    residual_stiffness: FreeFactor | None = entry("of residual_stiffness", default=None)
-    normal_load: FreeFactor | None = entry("of P", default=None)
+    friction: FreeFactor | None = entry("evolution of mu", default=None)
+    stiffness: FreeFactor | None = entry("evolution of kt", default=None)
+    residual_stiffness: FreeFactor | None = entry("evolution of residual_stiffness", default=None)
+    normal_load: FreeFactor | None = entry("evolution of P", default=None)
 
     @model_validator(mode="after")
     def _of_something(self) -> FreeEvolution:
@@ -206,14 +206,18 @@ class JointFit(Section):
     fit: Literal["joint_evolution"] = entry(KIND, "joint_evolution")
     measurements: tuple[JointMeasurement, ...] = entry("tables", min_length=1)
     law: Literal["bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan"] = entry(
-        "bouc_wen: its stiffness is all of kt; jenkins, uniform_iwan or four_parameter_iwan: kt "
-        "less residual_stiffness",
+        "bouc_wen: its stiffness is the whole kt; jenkins, uniform_iwan or four_parameter_iwan: "
+        "kt less residual_stiffness",
         "bouc_wen",
     )
     joint: NewJoint = entry("initial values", default=NewJoint())
-    evolution: FreeEvolution = entry("functions of the energy E, each a factor of that value")
+    evolution: FreeEvolution = entry(
+        "functions of the energy E, each a factor of the initial value"
+    )
     shared: tuple[Annotated[str, Word(("rate", "second_rate", "scale"))], ...] = entry(
-        "parameters with one value in all functions that have them free", ["rate"], default=()
+        "parameters that have one value in all functions in which they are free",
+        ["rate"],
+        default=(),
     )
 
     @model_validator(mode="after")
@@ -231,11 +235,13 @@ class JointFit(Section):
 class WearHeadings(Section):
     """Headings of the columns of a file, where they differ from the names here."""
 
-    energy: Heading | None = entry("dissipated in the test", "E", default=None)
-    amplitude: Heading | None = entry("of the slip: half the stroke", "delta", default=None)
-    volume: Heading | None = entry("worn off both bodies", "wear", default=None)
-    volume_1: Heading | None = entry("worn off body 1", "wear flat", default=None)
-    volume_2: Heading | None = entry("worn off body 2", "wear ball", default=None)
+    energy: Heading | None = entry("energy dissipated in the test", "E", default=None)
+    amplitude: Heading | None = entry(
+        "amplitude of the slip: half the stroke", "delta", default=None
+    )
+    volume: Heading | None = entry("volume worn off both bodies", "wear", default=None)
+    volume_1: Heading | None = entry("volume worn off body 1", "wear flat", default=None)
+    volume_2: Heading | None = entry("volume worn off body 2", "wear ball", default=None)
 
 
 Deviation = Annotated[float, Quantity("mm^3", above=0.0, range_text="above 0 um^3")]
@@ -244,9 +250,15 @@ Deviation = Annotated[float, Quantity("mm^3", above=0.0, range_text="above 0 um^
 class WearDeviations(Section):
     """Standard deviations of volumes; if not given, they are estimated from the residuals."""
 
-    volume: Deviation | None = entry("of both bodies [mm^3]", "1e5 um^3", default=None)
-    volume_1: Deviation | None = entry("of body 1 [mm^3]", "1e5 um^3", default=None)
-    volume_2: Deviation | None = entry("of body 2 [mm^3]", "1e5 um^3", default=None)
+    volume: Deviation | None = entry(
+        "deviation of the volume of both bodies [mm^3]", "1e5 um^3", default=None
+    )
+    volume_1: Deviation | None = entry(
+        "deviation of the volume of body 1 [mm^3]", "1e5 um^3", default=None
+    )
+    volume_2: Deviation | None = entry(
+        "deviation of the volume of body 2 [mm^3]", "1e5 um^3", default=None
+    )
 
 
 class WearMeasurement(Measurement):
@@ -273,7 +285,7 @@ class FreeWear(Section):
         default="none",
     )
     reference_amplitude: Length | None = entry(
-        "at which α holds, for the laws with an amplitude [mm]", "11 um", default=None
+        "amplitude at which α holds, for the laws with an amplitude [mm]", "11 um", default=None
     )
 
     @model_validator(mode="after")
@@ -293,7 +305,7 @@ class WearFit(Section):
     title: Title = entry("one line", "Wear coefficient of the fretting tests")
     fit: Literal["wear_coefficient"] = entry(KIND, "wear_coefficient")
     measurements: tuple[WearMeasurement, ...] = entry("tables: a row for each test", min_length=1)
-    wear: FreeWear = entry("what the volumes follow")
+    wear: FreeWear = entry("law that the volumes follow")
 
 
 # --- loops --------------------------------------------------------------------------------------
@@ -302,10 +314,14 @@ class WearFit(Section):
 class LoopHeadings(Section):
     """Headings of the columns of a file, where they differ from those of `fretscale loops`."""
 
-    displacement: Heading | None = entry("between the two sides", "LDV difference", default=None)
-    force: Heading | None = entry("that resists it", "load cell", default=None)
-    time: Heading | None = entry("where samples are not evenly spaced", "t", default=None)
-    normal_load: Heading | None = entry("that presses the joint", "preload", default=None)
+    displacement: Heading | None = entry(
+        "displacement between the two sides", "LDV difference", default=None
+    )
+    force: Heading | None = entry("force that resists it", "load cell", default=None)
+    time: Heading | None = entry("time, if samples are not evenly spaced", "t", default=None)
+    normal_load: Heading | None = entry(
+        "normal load that presses the joint", "preload", default=None
+    )
 
 
 class LoopMeasurement(Measurement):
@@ -324,12 +340,12 @@ class FreeJoint(Section):
 
     law: str  # named first; each law narrows it to its own name
     normal_load: Annotated[float | Free, _or_free(Preload)] | None = entry(
-        "without it that of the files [N]", "60 N", default=None
+        "normal load; without it that of the files [N]", "60 N", default=None
     )
     friction: FreeCoefficient = entry(
         "limit of the friction force over the normal load [1]", "free", default=FREE
     )
-    stiffness: FreeStiffness = entry("of the stuck joint [N/mm]", "free", default=FREE)
+    stiffness: FreeStiffness = entry("stiffness of the stuck joint [N/mm]", "free", default=FREE)
     residual_stiffness: FreeResidual = entry(f"{RESIDUAL} [N/mm]", "free", default=FREE)
 
 
@@ -343,7 +359,7 @@ class FreeBoucWen(FreeJoint):
         "shape of the unloading branch: straight at first with 0.5 [1]", 0.5, default=0.5
     )
     exponent: Annotated[float | Free, FreeOr(Quantity("1", at_least=1.0, at_most=100.0))] = entry(
-        "how sharply sticking turns into sliding [1]", "free", default=FREE
+        "sharpness of the transition from sticking to sliding [1]", "free", default=FREE
     )
 
 
@@ -364,12 +380,12 @@ class FreeFourParameterIwan(FreeJoint):
 
     law: Literal["four_parameter_iwan"] = entry("Segalman 2005", "four_parameter_iwan")
     chi: Annotated[float | Free, FreeOr(Quantity("1", above=-1.0, at_most=10.0))] = entry(
-        "energy of a small cycle goes with the amplitude to the power of chi + 3 [1]",
+        "the energy of a small cycle is proportional to the amplitude to the power of chi + 3 [1]",
         "free",
         default=FREE,
     )
     beta: Annotated[float | Free, FreeOr(Quantity("1", at_least=0.0, at_most=1e3))] = entry(
-        "stiffness lost at once in full slip over that of the spread sliders [1]",
+        "stiffness lost at once in full slip, relative to that of the spread sliders [1]",
         "free",
         default=FREE,
     )
@@ -381,7 +397,7 @@ class LoopFitSection(Section):
     title: Title = entry("one line", "Joint of the friction rig, as new")
     fit: Literal["joint_law"] = entry(KIND, "joint_law")
     measurements: tuple[LoopMeasurement, ...] = entry(
-        "records: of several strokes all are fitted together", min_length=1
+        "records; those of several strokes are fitted together", min_length=1
     )
     joint: Annotated[
         FreeBoucWen | FreeJenkins | FreeUniformIwan | FreeFourParameterIwan,

@@ -211,16 +211,16 @@ def _body(fitted: Fitted, body: str) -> list[EntryRow]:
     entries += _threshold(fitted, body)
     if (path := f"wear.{body}.intercept") in fitted.by_path:
         found = _row(fitted, path, "intercept")
-        comment = f"{found.comment}; a case has none: its volumes are less by so much"
+        comment = f"{found.comment}; a case has none: its volumes are smaller by this"
         entries.append(EntryRow("intercept", found.value, comment, off=True))
     if body != "both":
         return [EntryRow(body, entries)]
     total = entries[0]
     known = f"{total.value}, {total.comment}" if not total.off else total.comment
-    share = EntryRow("coefficient", LEFT_OUT, f"its share of what both have: {known}")
+    share = EntryRow("coefficient", LEFT_OUT, f"its share of the value of both: {known}")
     evolution = [entry for entry in entries if entry.key == "evolution"]
     others = [EntryRow("coefficient", LEFT_OUT, "the rest"), *evolution]
     return [
-        EntryRow("body_1", [share, *entries[1:]], "not measured each by itself", off=True),
+        EntryRow("body_1", [share, *entries[1:]], "not measured separately", off=True),
         EntryRow("body_2", others, "", off=True),
     ]

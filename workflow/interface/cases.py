@@ -91,7 +91,7 @@ class Check:
         memory = f"up to {self.memory / 1e9:.1f} GB"
         rows = *self.outline, ("memory", memory), ("time", self.time)
         lines = [f"  {name:<10} {text}" for name, text in rows]
-        return "\n".join([self.title, *lines, *(f"doubt: {doubt}" for doubt in self.doubts)])
+        return "\n".join([self.title, *lines, *(f"warning: {doubt}" for doubt in self.doubts)])
 
 
 def check(case: AnyCase, /, **overrides: Any) -> Check:

@@ -278,16 +278,16 @@ class MeshAssembly:
             if planes:
                 yield Remark(
                     f"{name}: cut by {planes_of_symmetry(planes)}: its half-space has the mirror "
-                    "image too, and what is told of the contact is that of the whole face; "
-                    "worn.msh and worn_nodes are the part that is meshed",
+                    "image too, and all results of the contact are those of the whole face; "
+                    "worn.msh and worn_nodes are the meshed part",
                     is_warning=False,
                 )
             elif name in structure.held_faces:
                 yield Remark(
-                    f"{name}: supports hold some of its nodes along it, and not as a plane of "
-                    "symmetry does, across x or y of the contact with all nodes that both bodies "
-                    "have on it: the structure knows of them, the half-space of the contact does "
-                    "not, whose pressure is that of a face that ends there; mesh the whole face"
+                    f"{name}: supports hold some of its nodes along it, but not as a plane of "
+                    "symmetry does (across x or y of the contact, with all nodes of both bodies "
+                    "there); the half-space does not know of this, and its pressure is that of a "
+                    "face that ends there: mesh the whole face"
                 )
 
 

@@ -191,16 +191,16 @@ class DovetailJoint:
         moments = any(mission.aerodynamic_moment for mission in self.missions)
         if moments and self.sides == "guided" and self.geometry.skew == 0.0:
             yield Remark(
-                "the sides of the disk's sector are guided, as the next sectors do without a "
-                "moment; structure.sides: cyclic has them move as those do with one",
+                "the sides of the disk's sector are guided, so they carry no moment; with "
+                "structure.sides: cyclic they move as those of the next sectors do",
                 is_warning=False,
             )
         slope, largest = float(np.tan(self.geometry.flank_angle)), max(friction)
         if largest > slope:
             yield Remark(
                 f"friction.coefficient {largest:g} exceeds the tangent of the flank angle, "
-                f"{slope:.3g}: the joint locks itself and the blade does not come back when the "
-                "load falls"
+                f"{slope:.3g}: the joint locks, and the blade does not move back when the load "
+                "falls"
             )
 
 

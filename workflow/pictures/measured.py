@@ -148,7 +148,7 @@ def _draw_all(measured: Sequence[Measured], curves: Sequence[CurvesOf], file: h5
     if not rows:
         for axis in panels[0]:
             axis.set_axis_off()
-        panels[0, 0].set_title("Nothing that was measured can be compared: see the warnings")
+        panels[0, 0].set_title("No measured points can be compared: see the warnings")
     return figure
 
 

@@ -101,8 +101,12 @@ def _note(quantities: Sequence[SummaryQuantity], marks: Mapping[str, str]) -> Ht
     """Return a note on what the errors cover and whether some results have none."""
     known = [quantity for quantity in quantities if quantity.error is not None]
     if not known:
-        return note("No error is estimated of any of these results.")
-    rest = " Of results without it no error is estimated." if len(known) < len(quantities) else ""
+        return note("No errors of these results are estimated.")
+    rest = (
+        " The errors of the other results are not estimated."
+        if len(known) < len(quantities)
+        else ""
+    )
     if not marks:
         return note(f"± is the estimated relative error: {known[0].error_of}.{rest}")
     sources = (element("span", element("sup", mark), f" {of}") for of, mark in marks.items())
@@ -129,9 +133,9 @@ def error_budget(quantities: Sequence[SummaryQuantity], summary: Mapping[str, An
     if not rows:
         return Html("")
     explained = note(
-        "What each part leaves of a result, relative to it, below 0 where it is known to be told "
-        "too small; “?” is not known, “–” does not apply. The total adds parts of known sign, half "
-        "of each besides, and the others by their sizes."
+        "Error of a result due to each part, relative to the result; below 0 where the result is "
+        "known to be too small. “?” is unknown, “–” does not apply. The total adds parts of "
+        "known sign, plus half of each, and the sizes of the others."
     )
     numbers = range(1, len(columns) + 2)
     return lines([table(["", *columns, "total"], rows, numbers), explained])

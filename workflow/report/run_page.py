@@ -55,7 +55,7 @@ def run_page(run: ToldRun) -> str:
     quantities = analysis_of(run.case).quantities(run.case, run.summary)
     budget = error_budget(quantities, run.summary)
     parts = [
-        section("What was computed", _outline(run)),
+        section("Analysis", _outline(run)),
         section("Results", results(quantities, run.summary) if quantities else ""),
         section("Warnings", _warnings(run.summary["warnings"])),
         section("Expectations", _expectations(run)),
@@ -64,8 +64,8 @@ def run_page(run: ToldRun) -> str:
         section("Error budget", budget),
         section("Remarks", _remarks(run.summary)),
         section("The case", *_case(run)),
-        section("Settings that were chosen", *_choice(run.summary)),
-        section("How it was computed", *_computing(run)),
+        section("Chosen settings", *_choice(run.summary)),
+        section("Methods", *_computing(run)),
         section("Time", _seconds(run.summary["seconds"])),
         section("The case file", folded("case.yaml", element("pre", run.case_text))),
     ]
@@ -145,7 +145,7 @@ def _expectations(run: ToldRun) -> Html:
         rows.append([name, *_verdict_cells(verdict, quantity), source])
     head = ["", "expected", "computed", "off by", "allowed", "", "expected from"]
     signs = any(entry.quantity.startswith(SIGNS) for entry in run.case.expect)
-    told = note("Of a change or trend 1 is a rise, −1 a fall, and 0 neither.") if signs else ""
+    told = note("For a change or trend, 1 is a rise, −1 a fall, and 0 neither.") if signs else ""
     return lines([table(head, rows, numbers=(1, 2, 3, 4), stacks=True), html(told)])
 
 
@@ -181,11 +181,14 @@ def _measured(summary: Mapping[str, Any]) -> Html:
         return Html("")
     head = ["", "points", "mean", "rms", "rms, relative", "chi² per point", "most at", "from"]
     told = (
-        "Computed minus measured, between two computed points by a straight line. Relative is over "
-        "the rms of what was measured. Of chi², 1 is the scatter that the deviations say."
+        "Computed minus measured, with straight lines between computed points. Relative is over "
+        "the rms of what was measured. A chi² of 1 is the scatter that the deviations give."
     )
     if any(one["nearest_of_several_branches"] for one in found if "refused" not in one):
-        told += " Of several branches of a curve the nearest one is meant, which flatters."
+        told += (
+            " Of several branches of a curve the nearest one counts, so the difference may be "
+            "too small."
+        )
     return lines([table(head, rows, numbers=(1, 2, 3, 4, 5, 6), stacks=True), html(note(told))])
 
 
@@ -237,8 +240,8 @@ def _case(run: ToldRun) -> Iterator[Html]:
         yield element("h3", "Assumed")
         yield element(
             "p",
-            "Not printed by the source of this case, and chosen by whoever wrote it (marked * "
-            "above): ",
+            "Not printed by the source of this case, but chosen by the author of the case "
+            "(marked * above): ",
             Html(", ".join(map(code, assumed))),
             ".",
         )
@@ -273,7 +276,7 @@ def _choice(summary: Mapping[str, Any]) -> Iterator[Html]:
         return
     yield element(
         "p",
-        f"Probes of {choice['seconds']:.3g} s chose what the case leaves open, for an accuracy of "
+        f"Probes of {choice['seconds']:.3g} s chose the open settings for an accuracy of "
         f"{percent(choice['accuracy'])}: estimated error {percent(choice['estimated_error'])}, "
         f"{'within' if choice['met'] else 'not within'} every share of it.",
     )
@@ -286,7 +289,7 @@ def _choice(summary: Mapping[str, Any]) -> Iterator[Html]:
         ]
         for decision in choice["decisions"]
     )
-    head = ["", "chosen", "estimated to leave", "of", "why"]
+    head = ["", "chosen", "estimated error", "of", "why"]
     yield table(head, rows, numbers=(2, 3), stacks=True)
 
 
@@ -299,10 +302,10 @@ def _share(share: float | None) -> str:
 
 
 def _computing(run: ToldRun) -> Iterator[Html]:
-    yield element("p", "To compute it again, with the case file below saved as case.yaml:")
+    yield element("p", "To compute it again, save the case file below as case.yaml and run:")
     yield element("pre", "fretscale run case.yaml --out DIR")
     if run.input_files:
-        yield element("p", "The case names files, which are not on this page:")
+        yield element("p", "Files named in the case, which are not on this page:")
         yield items(
             element("span", element("code", PurePath(name).name), f" (SHA-256 {digest[:DIGEST]}…)")
             for name, digest in run.input_files.items()

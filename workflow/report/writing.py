@@ -77,7 +77,7 @@ def told_run(root: Path, figures: bool = True) -> ToldRun:
     digests = summary[DIGESTS]
     results = folder.results
     if digests.get(results.name, "") != file_digest(results):
-        raise UserError(f"{results}: not as the run in {root} had it; {folder.again}")
+        raise UserError(f"{results}: differs from the run in {root}; {folder.again}")
     case = load_case(folder.case)
     return ToldRun(
         case=case,

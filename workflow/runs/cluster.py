@@ -80,8 +80,8 @@ class _Watch:
     def failure(self, why: str, left: int) -> MethodFailed:
         """Return the exception to raise if ``left`` runs cannot be waited for."""
         return MethodFailed(
-            f"--dask {self._address}: {why}, {left} of {self._total} runs not known to have ended; "
-            "what is done is kept: the same command goes on"
+            f"--dask {self._address}: {why}, {left} of {self._total} runs may not have ended; "
+            "finished runs are stored: continue with the same command"
         )
 
     def look(self, left: int) -> None:
@@ -103,7 +103,7 @@ class _Watch:
                 none, ending = "no worker is left", f"given up after {in_words(GIVE_UP)} of that"
             LOG.warning(
                 f"--dask {self._address}: {none}, {left} of {self._total} runs wait for one; "
-                f"{ending}, what is done is kept"
+                f"{ending}, finished runs are stored"
             )
 
     def _has_workers(self) -> bool:

@@ -144,8 +144,10 @@ def _ending(process: subprocess.Popen[str], answer: str, stderr: str) -> str:
         return one_line(json.loads(answer)["error"])
     if process.returncode < 0:
         number = -process.returncode
-        return str(MethodFailed(f"the process of this run got signal {number}: for its memory?"))
-    last = (stderr.strip().splitlines() or ["it said nothing"])[-1]
+        return str(
+            MethodFailed(f"the process of this run got signal {number}: did it run out of memory?")
+        )
+    last = (stderr.strip().splitlines() or ["no message"])[-1]
     return f"the process of this run ended with exit code {process.returncode}: {last}"
 
 
@@ -153,7 +155,7 @@ def finished(job: Job, out: Path, error: str) -> Finished:
     """Return a job that has ended, with the summary of its run."""
     root = out / job.name
     if not error and not OutputFolder(root).summary.exists():
-        error = f"{root}: finished, but its summary is not to be seen here: is the folder shared?"
+        error = f"{root}: finished, but its summary is not visible here: is the folder shared?"
     try:
         return Finished(job, root, None if error else OutputFolder(root).read_summary(), error)
     except UserError as damaged:

@@ -150,7 +150,9 @@ def _working(
         if analysis_of(case).resumable and OutputFolder(out).case.exists():
             again = f"`{OutputFolder(out).resume_command}`"
         where = error.filename or out
-        raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
+        raise NotWritten(
+            f"{where}: {error.strerror}; continue with {again} once it is possible"
+        ) from error
 
 
 def _start(
@@ -175,7 +177,7 @@ def _start(
     stays = folder.claim(case, force, analysis.resumable)
     folder.keep_choice(choice)
     if damaged:
-        damaged = f"an earlier run is not taken: {damaged}"
+        damaged = f"an earlier run is not used: {damaged}"
     _run(analysis, case, folder, (gone, damaged), loudness, stays=stays)
 
 
@@ -186,19 +188,19 @@ def _go_on(
     analysis, out = analysis_of(case), folder.root
     if not analysis.resumable:
         raise UserError(
-            f"{out}: a case of this kind takes up no run half done; start it again with "
+            f"{out}: a case of this kind cannot continue a half-done run; start it again with "
             f"`{folder.run_command}`"
         )
     if not folder.lists_state:
         raise UserError(
-            f"{out}: its {MANIFEST} does not list its files: damaged, or a run of an older "
+            f"{out}: its {MANIFEST} does not list its files: it is damaged, or of an older "
             f"version; start it again with `fretscale run {folder.case} --out DIR`"
         )
     kept = _state(folder, case)
     analysis.memory(case).check()
     folder.clear_partial()
     folder.reserve_state()
-    new = "" if kept else "no state was kept: from the start"
+    new = "" if kept else "no state was stored: from the start"
     _run(analysis, case, folder, (gone, new), loudness, resume=True, kept=kept)
 
 
@@ -241,8 +243,8 @@ def _run(
             reporter.say(line)
         if stays:
             reporter.warn(
-                f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
-                f"name that the run needs gets {ASIDE} at its end"
+                f"{', '.join(stays)}: in the folder before this run, and not part of it; files "
+                f"whose names the run needs get {ASIDE} at their end"
             )
         _announce(case, reporter.expected, resume, reporter)
         run = Run(
@@ -288,19 +290,19 @@ def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -
     takes = f" ({expected.short})" if long else ""
     reporter.say(f"{'resume' if resume else 'run'}: {case.title}{takes}")
     for doubt in doubts_of(case):
-        reporter.say(f"doubt: {doubt}", always=True)
+        reporter.say(f"warning: {doubt}", always=True)
 
 
 def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
     """Return what a run has left after Ctrl-C, and the command that resumes it."""
     out = folder.root
     if not folder.case.exists():
-        return f"{out} has nothing yet; start again with the same command"
+        return f"{out} is still empty; start again with the same command"
     if folder.summary.exists():
-        return f"{out} is finished but for what is removed by `{folder.resume_command}`"
+        return f"{out} is finished, but for files that `{folder.resume_command}` removes"
     if not analysis.resumable:
         return f"{out} is not finished; start again with `{folder.run_command}`"
-    return f"{out} keeps what is done; go on with `{folder.resume_command}`"
+    return f"{out} keeps what is done; continue with `{folder.resume_command}`"
 
 
 def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from sa_solver.surfaces.resolution import cells_across, fewest_across, is_point, peak_error
 from sa_solver.types import Array, Grid
+from workflow.case.text.readable import percent
 from workflow.errors import UserError
 from workflow.shell.terminal.reporter import Reporter
 
@@ -54,13 +55,14 @@ def check_cells(
     cells, remedy = " x ".join(map(str, across)), " or ".join(grids or ["a finer contact.grid"])
     if is_point(pressed) and not worn:
         raise UserError(
-            f"contact.grid: {name} is only {cells} cells across, which says nothing of its size "
-            f"and pressure: finer cells are needed than those of {remedy}"
+            f"contact.grid: {name} is only {cells} cells across, so its size and pressure are "
+            f"meaningless: finer cells are needed than those of {remedy}"
         )
     after = " after wear" if worn else ""
     reporter.warn(
-        f"{name} is {cells} cells across{after}, where {enough} resolve it: the largest pressure "
-        f"may be {peak_error(min(across)):.1%} off and the width a cell; take {remedy}"
+        f"{name} is only {cells} cells across{after}, and {enough} are needed: the largest "
+        f"pressure may have an error of {percent(peak_error(min(across)))}, and the width one of a "
+        f"cell; take {remedy}"
     )
 
 

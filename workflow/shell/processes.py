@@ -257,7 +257,7 @@ def _answers(hearings: list[_Hearing]) -> list[Any]:
 
 def _gone(error: Exception) -> MethodFailed:
     return MethodFailed(
-        f"a process of the run has gone ({type(error).__name__}): was it killed for memory?"
+        f"a process of the run is gone ({type(error).__name__}): did it run out of memory?"
     )
 
 

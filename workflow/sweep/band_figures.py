@@ -116,7 +116,9 @@ def _draw_panel(axis: Axes, way: Way, name: str, curves: Sequence[Curve]) -> Non
     else:
         for number, (x, y) in enumerate(shown[:MOST_RUNS]):
             axis.plot(x, y, color=BLACK, lw=0.5, alpha=0.4, label=None if number else "each run")
-        axis.set_title(f"{name}: no band, runs do not turn back alike")
+        axis.set_title(
+            f"{name}: no band, because the curves of the runs turn back at different places"
+        )
     if first.logarithmic:
         axis.set_yscale("log", nonpositive="mask")
     axis.set_xlabel(_label(first.x_name, x_unit))

@@ -217,7 +217,7 @@ def _correlation(places: Array, values: Array) -> str:
     if np.count_nonzero(done) < FEWEST_TO_CORRELATE or np.ptp(places[done]) == 0.0:
         return ""
     if np.ptp(values[done]) == 0.0:
-        return ", the same in all runs"
+        return ", equal in all runs"
     from scipy.stats import spearmanr
 
     rank = float(spearmanr(places[done], values[done]).statistic)

@@ -115,7 +115,7 @@ def read_fit(path: Path) -> FittedSample:
         if isinstance(error, UserError):
             raise
         raise UserError(
-            f"{path}: not what a fit tells; allowed: summary.json of `fretscale fit`"
+            f"{path}: no result of a fit; allowed: summary.json of `fretscale fit`"
         ) from None
     if not parameters:
         raise UserError(f"{path}: no parameter that a case has; allowed: a fit with one")

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.case.text.plain import counted
+from workflow.case.text.plain import counted, shares
 from workflow.errors import CaseError, UserError
 from workflow.kinds import analysis_of
 from workflow.runs.job import Finished, Job
@@ -62,13 +62,13 @@ def run_sweep(
         finished = _check_runs(sweep, runs, out / RUNS, force)
         write_text(folder.reserve(FILE, "the sweep as run"), text)
         (out / RUNS).mkdir(exist_ok=True)
-        log = folder.reserve(LOG, "what it said, and when")
+        log = folder.reserve(LOG, "messages of the sweep, with times")
         with closing(Reporter(log, True, loudness=loudness)) as reporter:
             if gone:
                 reporter.say(gone)
             reporter.say(
-                f"sweep: {counted(len(runs), 'run')} of {sweep.file.case}, "
-                f"{finished} finished before"
+                f"sweep: {counted(len(runs), 'run')} of {sweep.file.case}, {finished} finished "
+                "before"
             )
             rows = _run(sweep, runs, folder, processes, dask, finished, reporter)
             with reporter.stage("figures"):
@@ -100,7 +100,7 @@ def _check_runs(sweep: Sweep, runs: Sequence[SweepRun], out: Path, force: bool) 
                 f"{out / run.name}: holds a run of another case; give another folder, or --force"
             )
     if wrong:
-        more = [f"and {len(wrong) - MOST_LINES} more like these"] if len(wrong) > MOST_LINES else []
+        more = [f"and {len(wrong) - MOST_LINES} more errors"] if len(wrong) > MOST_LINES else []
         raise CaseError("\n".join([*list(wrong)[:MOST_LINES], *more]))
     return states.count("finished")
 
@@ -213,17 +213,17 @@ def _lacking(sweep: Sweep, rows: Sequence[SweepRow]) -> str:
     """Return which bands cannot be determined; empty if there are all."""
     done = sum(row.done for row in rows)
     if sweep.file.design == "sample" and done < FEWEST:
-        return f"no 95 % bands: {counted(done, 'run')} done; they take {FEWEST}"
+        return f"no 95 % bands: {counted(done, 'run')} done, {FEWEST} are needed"
     if sweep.file.design != "linear":
         return ""
     if done < len(rows):
-        return "no 95 % bands: to first order they take all runs"
+        return "no 95 % bands: to first order they need all runs"
     bent = [name for name, values in columns_of(rows).items() if _bent(values)]
     if not bent:
         return ""
     return (
-        f"{counted(len(bent), 'number')} not linear within {LINEAR:.0%} and without a band, such "
-        f"as {bent[0]}: take design: sample"
+        f"{counted(len(bent), 'number')} not linear within {shares(LINEAR)} and without a band, "
+        f"such as {bent[0]}: take design: sample"
     )
 
 

@@ -129,7 +129,7 @@ class _Range(_Between):
 class _Uniform(_Between):
     """Uniform distribution between two ends."""
 
-    kind: Literal["uniform"] = entry("of the distribution", "uniform")
+    kind: Literal["uniform"] = entry("kind of the distribution", "uniform")
 
 
 _FIRST = {"from": (AnyAmount, entry("first value", "20 mm"))}
@@ -141,8 +141,8 @@ Uniform = create_model("Uniform", __base__=_Uniform, **_FIRST, **_LAST)  # type:
 class Normal(Section):
     """Normal distribution; its tails are unbounded, so that a case may refuse extreme values."""
 
-    kind: Literal["normal"] = entry("of the distribution", "normal")
-    mean: AnyAmount = entry("of the values", "30 mm")
+    kind: Literal["normal"] = entry("kind of the distribution", "normal")
+    mean: AnyAmount = entry("mean of the values", "30 mm")
     deviation: PositiveAmount = entry("standard deviation of the values", "1 mm")
 
     @model_validator(mode="after")
@@ -154,10 +154,10 @@ class Normal(Section):
 class LogNormal(Section):
     """Lognormal distribution: 68 % of the values are within ``factor`` of the median."""
 
-    kind: Literal["lognormal"] = entry("of the distribution", "lognormal")
-    median: PositiveAmount = entry("half of the values are below it", "1e4 um^3/J")
+    kind: Literal["lognormal"] = entry("kind of the distribution", "lognormal")
+    median: PositiveAmount = entry("median: half of the values are below it", "1e4 um^3/J")
     factor: Annotated[float, Field(gt=1.0)] = entry(
-        "exp of the standard deviation of the logarithms [1]", 1.3
+        "geometric standard deviation, exp of that of the logarithms [1]", 1.3
     )
 
 
@@ -165,7 +165,7 @@ def _require_one_unit(section: Section, first_key: str, second_key: str) -> None
     first, second = getattr(section, first_key), getattr(section, second_key)
     if first.unit != second.unit:
         raise disagreement(
-            f"{shown(second.written)} beside {shown(first.written)}; allowed: the same unit",
+            f"{shown(second.written)} and {shown(first.written)}; allowed: the same unit",
             second_key,
         )
 
@@ -203,15 +203,13 @@ class SweepFile(Section):
 
     title: Title | None = entry("one line; the case's by default", "Spread of wear", default=None)
     case: Annotated[str, File((".yaml", ".yml"))] = entry(
-        "file, as seen from the folder of this one", "dovetail_2d.yaml"
+        "file, path from the folder of this one", "dovetail_2d.yaml"
     )
     set: dict[str, AnyValue] = entry("entries changed in every run", default={})
-    vary: Section = entry(
-        "what each entry is given, by its dotted path in the case", default=Section()
-    )
+    vary: Section = entry("values of each entry, by its dotted path in the case", default=Section())
     fit: Annotated[str, File((".json",))] | None = entry(
-        "summary.json of a fit: its parameters vary too, as it knows them; for design: sample or "
-        "linear",
+        "summary.json of a fit, whose parameters vary too, with its bounds; for design: sample "
+        "or linear",
         "wear/summary.json",
         default=None,
     )
@@ -224,7 +222,7 @@ class SweepFile(Section):
     samples: Annotated[int, Whole(1, MOST_RUNS)] | None = entry(
         "number of runs, for design: sample", 50, default=None
     )
-    seed: Annotated[int, Whole(0, 2**31)] = entry("of the sample", 0, default=0)
+    seed: Annotated[int, Whole(0, 2**31)] = entry("seed of the sample", 0, default=0)
 
     def variations(self) -> dict[str, Variation]:
         """Return the variation of each entry, by its path."""
@@ -235,7 +233,7 @@ class AnySweepFile(SweepFile):
     """Sweep file with any varied entries, for editors."""
 
     vary: dict[str, Variation] = entry(  # type: ignore[assignment]
-        "what each entry is given, by its dotted path in the case", default={}
+        "values of each entry, by its dotted path in the case", default={}
     )
 
 
@@ -325,7 +323,7 @@ def _beside_a_fit(sweep: Sweep) -> Iterator[str]:
     for name in sweep.fitted.entries:
         if name in varied or name in file.set:
             where = place(("vary" if name in varied else "set", name))[1]
-            yield f"{where}: {name}: the fit gives it too; allowed: one of them"
+            yield f"{where}: {name}: given by the fit, too; allowed: one of them"
     if file.design not in DRAWN:
         allowed = " or ".join(DRAWN)
         yield f"{place(('fit',))[1]}: fit: in design: {file.design}; allowed: design: {allowed}"

@@ -189,7 +189,7 @@ def test_of_many_mistakes_the_first_are_told(tmp_path, dovetail_text):
     *lines, last = result.stderr.splitlines()
     assert len(lines) == 20
     assert "contakt19: unknown key; did you mean 'contact'?" in lines[-1]
-    assert last == f"fretscale: {path}: and 480 more like these"
+    assert last == f"fretscale: {path}: and 480 more errors"
 
 
 def test_odd_keys_are_quoted(tmp_path, dovetail_text):

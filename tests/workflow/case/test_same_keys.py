@@ -37,8 +37,8 @@ def test_grids_of_areas_are_two_numbers(name, grid):
     ("name", "override", "told"),
     [
         ("specimens_coarse", "load_path.P=60 N", "allowed: normal_forces, one after the other"),
-        ("dovetail_2d", "load_path.peak_at=8", "the first leg of increments, which are [8, 14]"),
-        ("sphere_wear", "materials.body_1.density=1e-9", "no mass is moved here"),
+        ("dovetail_2d", "load_path.peak_at=8", "the first leg of increments: [8, 14]"),
+        ("sphere_wear", "materials.body_1.density=1e-9", "nothing here depends on mass"),
         ("sphere_wear", "wear.body_1.specific_wear_rate=1e-9", "coefficient, which is that rate"),
     ],
 )

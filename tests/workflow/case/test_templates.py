@@ -45,11 +45,11 @@ NEEDS = {
     "\n      # joint:  # law and parameters of these": [f"structure={OWN_ON_BODY}"],
     "\n      # joint:  # or: Contact at points": [f"structure={OWN_ON_BODY}"],
     "  kind: friction_rig": [f"joint={CONTACT | {'normal_load': 60}}"],
-    "  # size: 2 mm  # for CAD files only": CAD,
+    "  # size: 2 mm  # size of the elements, for CAD": CAD,
     "structure.cyclic": [SECTOR],
     **{f"structure.matrices.{part}": [APART] for part in APART_MATRICES},
     # Points whose spacing lets a scan cover the whole face of the template.
-    " surfaces:  # as measured, on top of the gap, or": [
+    " surfaces:  # measured surfaces of every face, added to the gap, or": [
         "structure.surfaces.body_1.pitch=[0.1, 0.2]"
     ],
     " intrados:  # flank at": ["structure.surfaces.intrados.disk.pitch=[0.1, 0.2]"],
@@ -116,7 +116,7 @@ class Template:
         end = self.end(start, "# ")
         block = [re.sub(f"^{indent}# ", indent, line) for line in self.lines[start:end]]
         comment = block[0].partition("  # ")[2]
-        instead = re.match(r"instead of ([\w.]+)(?: and (\w+))?", comment)
+        instead = re.search(r"instead of ([\w.]+)(?: and (\w+))?", comment)
         gone = [key] if comment.startswith("or: ") else []
         gone += [name for name in (instead.groups() if instead else ()) if name]
         lines = [*self.lines[:start], *block, *self.lines[end:]]

@@ -67,7 +67,7 @@ def test_they_need_no_pint(text, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("1 mm³/N·m", "cannot be converted to 1/MPa; all that is below / needs brackets"),
+        ("1 mm³/N·m", "cannot be converted to 1/MPa; use brackets for all that is below /"),
         ("1×10^-8 1/MPa", "power of ten; write 1e-8"),
         ("1 mm^3", "cannot be converted to 1/MPa"),
     ],

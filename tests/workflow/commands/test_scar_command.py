@@ -51,7 +51,7 @@ def test_two_scans_give_volume_table_map_and_figure(pair, tmp_path):
     told = done.stdout.splitlines()[0].split()
     assert told[0] == "volume"
     assert abs(float(told[1]) - 1e9 * volume) < float(told[3]) < 0.01e9 * volume
-    assert "laid over each other: the second lies" in done.stdout
+    assert "aligned: the second lies" in done.stdout
     table = read_table_file(tmp_path / "out" / "scar.csv")
     assert float(table.cells("value")[0]) == pytest.approx(volume, rel=0.01)
     with np.load(tmp_path / "out" / "scar.npz") as fields:
@@ -69,7 +69,7 @@ def test_two_scans_give_volume_table_map_and_figure(pair, tmp_path):
         (["--worn", "0,1,2"], "not four; allowed: lengths from the middle"),
         (["--worn", "0 N,1,2,3"], "allowed: a length such as '4 um'"),
         (["--worn", "5,6,5,6"], "no point of the scan is in it"),
-        (["--bare", "um", "4 um", "4 um"], "says its units and pitch itself"),
+        (["--bare", "um", "4 um", "4 um"], "states its units and pitch itself"),
         (["--bare", "ell", "4 um", "4 um"], "no such unit; allowed: m, mm, um, nm"),
     ],
 )
@@ -86,14 +86,14 @@ def test_files_mixed_up_are_told(pair):
     assert ended.exit_code == 2
     assert "no area is clearly deeper than the noise" in ended.stderr
     given = command("scar", pair[1], pair[0], "--worn", "-0.33,0.33,-0.33,0.33")
-    assert "doubt: no volume that differs from none; are the files in order?" in given.stdout
+    assert "warning: the volume does not differ from none" in given.stdout
 
 
 def test_a_scan_and_itself_have_no_error_that_is_told(pair, tmp_path):
     done = command("scar", pair[0], pair[0], "--worn", "-0.3,0.3,-0.3,0.3", "--out", tmp_path)
     assert (done.exit_code, done.stderr) == (0, "")
-    assert done.stdout.splitlines()[0] == "volume   0 um^3 (0 mm^3), its error unknown"
-    assert "doubt: both scans are the same around the worn area" in done.stdout
+    assert done.stdout.splitlines()[0] == "volume   0 um^3 (0 mm^3), error unknown"
+    assert "warning: both scans agree around the worn area" in done.stdout
     assert (tmp_path / "scar.csv").read_text("utf-8").splitlines()[1] == "volume [mm^3],0,"
     assert "nan" not in done.stdout + (tmp_path / "scar.csv").read_text("utf-8")
 

@@ -132,7 +132,7 @@ def test_run_with_a_damaged_cache_finds_the_same_and_says_so(start, whole, tmp_p
     assert not run.summary["structure"]["from_cache"]
     log = (run.folder / "run.log").read_text("utf-8")
     # The joint, the halves of both bodies, and the cycle.
-    assert log.count("damaged: not what was written there; computed again") == damaged == 6
+    assert log.count("damaged: it differs from what was written; computed again") == damaged == 6
 
 
 # --- finished runs --------------------------------------------------------------------------------
@@ -191,8 +191,8 @@ DAMAGES = [
     (torn_summary, "summary.json: damaged"),
     (odd_summary, "summary.json: damaged"),
     (summary_of_an_older_version, "summary.json: damaged, or of an older version"),
-    (bit_in_results, "results.h5: not as the run"),
-    (no_results, "results.h5: not as the run"),
+    (bit_in_results, "results.h5: differs from the run"),
+    (no_results, "results.h5: differs from the run"),
 ]
 
 
@@ -208,7 +208,7 @@ def test_finished_run_that_was_changed_is_computed_again(left, finished, damage,
     assert "start again with" in str(refusal.value)
     assert bring_to_end(case, out)
     log = (out / "run.log").read_text("utf-8")
-    assert "an earlier run is not taken: " in log
+    assert "an earlier run is not used: " in log
     assert wrong in log
     assert (out / "results.h5").read_bytes() == (finished / "out/results.h5").read_bytes()
 
@@ -220,7 +220,7 @@ def test_finished_run_of_other_files_is_computed_again(finished, left):
     try:
         swap(loads, b"400, 150, 0, 3\n", b"400, 150, 0, 4\n")
         assert kept_in(out, case) == "nothing"
-        with pytest.raises(UserError, match=r"loads\.csv: not as the run in"):
+        with pytest.raises(UserError, match=r"loads\.csv: differs from the run"):
             resume_run(out)
     finally:
         loads.write_bytes(before)
@@ -234,7 +234,7 @@ def test_finished_run_whose_case_was_changed_is_not_its_run(left, finished):
     assert kept_in(out, case) == "other"
     other = load_case(finished / "wear.yaml", ("friction.coefficient=0.6",))
     assert kept_in(out, other) == "nothing"
-    with pytest.raises(UserError, match=r"case\.yaml: not as the run in"):
+    with pytest.raises(UserError, match=r"case\.yaml: differs from the run"):
         resume_run(out)
 
 

@@ -188,7 +188,7 @@ def test_a_limit_of_the_system_ends_a_run_in_one_line(size, ball, tmp_path):
     *said, line = [line for line in ending.stderr.splitlines() if line]
     assert line.startswith(f"fretscale: {out}/")
     assert "File too large" in line
-    assert "go on with the same command" in line
+    assert "continue with the same command" in line
     assert said == (["run: Ball"] if size else [])
     assert not list(tmp_path.rglob(".*"))
 

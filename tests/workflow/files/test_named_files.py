@@ -69,7 +69,7 @@ def test_no_case_names_one_that_names_it(tmp_path, way):
     [
         (BALL, "no case of wear with loops"),
         ("", "w.yaml:1: empty"),
-        (ROLLER_WEAR, "leaves no table of loops"),
+        (ROLLER_WEAR, "writes no table of loops"),
         (ROLLER_WEAR.replace("loads.csv", "none.csv"), "'none.csv': no such file"),
     ],
 )

@@ -123,8 +123,8 @@ def test_how_well_a_cycle_is_closed_is_told_and_read_back(tmp_path):
         assert read_resultants(path)["f"].closure == 3.5e-3
     told = table.read_text().splitlines()[0]
     assert told.endswith(
-        "the last of 13 cycles marched from rest, which changes the contact forces of the one "
-        "before it by 3.5e-03 of the largest"
+        "the last of 13 cycles marched from rest; the contact forces differ from the cycle "
+        "before by 3.5e-03 of the largest"
     )
     with h5py.File(fields) as file:
         assert file["f"].attrs["cycles"] == 13

@@ -190,7 +190,7 @@ def test_frames_must_be_right_handed(tmp_path):
             read_resultants(path)
     with h5py.File(path, "a") as file:
         del file["f"].attrs["origin"]
-    with pytest.raises(InputFileError, match="/f: attribute axes alone"):
+    with pytest.raises(InputFileError, match="/f: only the attribute axes"):
         read_resultants(path)
 
 

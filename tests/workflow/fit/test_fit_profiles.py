@@ -97,7 +97,7 @@ def test_coefficients_of_both_bodies_come_back_through_closed_forms(folder, monk
         errors = found.summary["runs"]["relative_errors"][path]
         assert abs(errors["for_want_of_runs"]) < 0.1 * found[path].deviation / true
         assert errors["by_finer"] == pytest.approx(-0.03, rel=0.1)
-        assert any(d.startswith(f"{path}: finer runs move it by") for d in found.doubts)
+        assert any(d.startswith(f"{path}: finer runs change it by") for d in found.doubts)
     assert "the runs: it is a closed form" in found.doubts
     assert found.summary["runs"]["made"] <= 5
     section = YAML(typ="safe", pure=True).load(found.section)["wear"]
@@ -128,7 +128,7 @@ def test_nonsense_is_refused_with_its_place(folder, file, old, new, words):
 
 
 def test_its_runs_need_a_folder(folder):
-    with pytest.raises(fretscale.UserError, match="keeps them in a folder; allowed: --out"):
+    with pytest.raises(fretscale.UserError, match="stores them in a folder; allowed: --out"):
         fretscale.fit(folder / "fit.yaml")
 
 

@@ -201,5 +201,5 @@ def test_ctrl_c_ends_a_script_by_its_exception(tmp_path):
         script.send_signal(signal.SIGINT)
         told = script.stderr.read().decode()
     assert told.splitlines()[-1].startswith("KeyboardInterrupt")
-    with pytest.raises(fretscale.UserError, match="not finished; go on with `fretscale res"):
+    with pytest.raises(fretscale.UserError, match="not finished; continue with `fretscale res"):
         fretscale.open(tmp_path / "out")

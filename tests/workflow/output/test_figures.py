@@ -64,7 +64,7 @@ def test_resultants_stay_inside_the_axes_and_the_coulomb_limits(results: Path) -
         figure = figures.resultants(file, CONTENTS)
         peak = max(group["load_history/P"][()].max() for group in file["structure"].values())
         assert figure.axes[0].get_ylim()[1] >= peak / 1e3
-        assert "64%" in title(figure)  # 14 of 22 increments on either flank
+        assert "64 %" in title(figure)  # 14 of 22 increments on either flank
 
 
 def test_pressure_maps_share_one_scale_and_name_the_peaks(results: Path) -> None:

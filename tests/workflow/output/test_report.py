@@ -113,7 +113,7 @@ def test_page_tells_all_of_a_run_and_needs_nothing_else(drawn):
     assert "115 GPa" in page.told["The case"]
     assert "friction" in page.told["The case"]
     assert (drawn / "case.yaml").read_text("utf-8") in page.told["The case file"]
-    assert "numpy" in page.told["How it was computed"]
+    assert "numpy" in page.told["Methods"]
     seconds = json.loads((drawn / "summary.json").read_text("utf-8"))["seconds"]
     told = [name for name in seconds if name in page.told["Time"]]
     assert told == [name for name, spent in seconds.items() if spent >= AT_ONCE]
@@ -175,7 +175,7 @@ def test_no_page_of_what_is_no_finished_run(drawn, tmp_path):
     for name in ("case.yaml", "summary.json", "results.h5", "manifest.json"):
         (tmp_path / name).write_bytes((drawn / name).read_bytes())
     (tmp_path / "results.h5").write_bytes(b"other")
-    with pytest.raises(UserError, match=r"results\.h5: not as the run"):
+    with pytest.raises(UserError, match=r"results\.h5: differs from the run"):
         write_report(tmp_path)
     (tmp_path / "summary.json").write_text("{}", encoding="utf-8")
     with pytest.raises(UserError, match="damaged, or of an older version"):
@@ -208,7 +208,7 @@ def test_results_say_what_they_hold(analysis, tmp_path):
         read_contents(path, kind)
     with h5py.File(path, "w"):
         pass
-    with pytest.raises(UserError, match="does not say what it holds"):
+    with pytest.raises(UserError, match="has no contents list"):
         read_contents(path, kind)
     assert kind is not NoneType
 

@@ -175,7 +175,7 @@ def test_large_matrices_are_reduced_and_told(two):
     path.write_text(text, encoding="utf-8")
     checked = command("check", path)
     assert checked.exit_code == 0
-    assert "doubt: structure.retained: none, so that all 3000 unknowns are kept" in checked.stdout
+    assert "warning: structure.retained: none, so that all 3000 unknowns are kept" in checked.stdout
     rig = rig_of(two, "structure.retained=[tip]", "structure.modes=8", text=text)
     assert rig.model.names == ("tip x", *(f"mode {number}" for number in range(1, 9)))
     # Of a row that is fixed at both ends: a spring is to the ground behind the tip, too.
@@ -224,7 +224,7 @@ def test_points_without_mass_follow_the_others_and_are_told(two):
     log = (two / "run.log").read_text(encoding="utf-8")
     assert "tip x have no mass and follow the others statically" in log
     at_the_tip = "structure.joints=[{points: tip, direction: x}]"
-    with pytest.raises(UserError, match=r"tip'.*no mass.*allowed there: structure\.masses"):
+    with pytest.raises(UserError, match=r"tip'.*no mass.*structure\.masses"):
         rig_of(two, at_the_tip)
     laden = rig_of(two, at_the_tip, "structure.masses=[{points: tip, mass: 1 g}]")
     assert np.diag(laden.model.mass) == pytest.approx([1e-3, 1e-3, 1e-6])
@@ -245,14 +245,14 @@ def test_a_joint_on_a_point_without_mass_is_in_series_with_its_spring(two):
     assert lumped["energy_per_cycle"] > 0.0
     (two / "case.yaml").write_text(OWN, encoding="utf-8")
     checked = command("check", two / "case.yaml", overrides=["structure.massless=2 kHz"])
-    assert "doubt: structure.massless: 2000 Hz; at 310 Hz" in checked.stdout
+    assert "warning: structure.massless: 2000 Hz is too low: at 310 Hz" in checked.stdout
 
 
 def test_a_mode_that_is_lost_beside_faster_ones_is_told(two):
     np.savez(two / "two.npz", K=np.diag([1.0, 1e7, 2e7, 1e14]), M=1e-3 * np.eye(4))
     (two / "unknowns.csv").write_text(f"{ROWS}a,x\nb,x\n", encoding="utf-8")
     rig_of(two)
-    warning = "the mode of 5.03 Hz is taken for a rigid motion beside the fastest"
+    warning = "the mode of 5.03 Hz is so far below the fastest"
     assert warning in (two / "run.log").read_text(encoding="utf-8")
 
 
@@ -269,10 +269,10 @@ def test_added_masses_do_not_turn(two):
 def test_units_that_are_hardly_meant_are_doubted(two):
     (two / "case.yaml").write_text(OWN, encoding="utf-8")
     checked = command("check", two / "case.yaml", overrides=[IN_METRES.replace("kN", "GN")])
-    assert "doubt: structure.matrices.units: 2.1e+07 kg along x" in checked.stdout
+    assert "warning: structure.matrices.units: the mass along x is 2.1e+07 kg" in checked.stdout
     kg = "structure.matrices.units={length: mm, force: N, mass: ug}"
     checked = command("check", two / "case.yaml", overrides=[kg])
-    assert "doubt: structure.matrices.units:" in checked.stdout
+    assert "warning: structure.matrices.units:" in checked.stdout
 
 
 @pytest.mark.parametrize(
@@ -301,9 +301,11 @@ def test_matrices_by_other_names_are_offered(two):
     scipy.io.savemat(two / "plant.mat", {**given, "title": "two masses"})
     file = "structure.matrices.file=plant.mat"
     (doubt,) = doubts_of(parse_case(OWN, str(two / "case.yaml"), [file]))
-    assert doubt.startswith("structure.matrices.damping: none by a usual name; plant.mat:D could")
+    assert doubt.startswith(
+        "structure.matrices.damping: no matrix with a usual name; plant.mat:D could"
+    )
     line = told(two, file, "structure.driven={load: 1}")
-    assert "no loads by a usual name, or matrices.loads: plant.mat:B" in line
+    assert "no loads have a usual name, or matrices.loads: plant.mat:B" in line
     taken = [file, "structure.matrices.damping=plant.mat:D", "structure.matrices.loads=plant.mat:B"]
     assert not list(doubts_of(parse_case(OWN, str(two / "case.yaml"), taken)))
     difference = rig_of(two, *taken).model.damping - rig_of(two, file).model.damping

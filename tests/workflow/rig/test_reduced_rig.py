@@ -303,7 +303,7 @@ def test_memory_grows_with_the_body(specimen):
         ("structure.body=1", "given beside a single body"),
         ("structure.joints=[]", "a list of at least 1, with points, direction below it"),
         ("structure.joints.0.direction=w", "'x', 'y', 'z'"),
-        ("joint.gap=1 um", "given beside a normal load"),
+        ("joint.gap=1 um", "given with a normal load"),
     ],
 )
 def test_a_wrong_case_is_refused(specimen, override, words):

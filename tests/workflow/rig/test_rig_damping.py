@@ -76,8 +76,8 @@ def test_dashpots_damp_in_time(tmp_path):
         ("damping_ratio=[1 %, 1 %, 1 %]", "3 ratios for 2 modes; allowed: as many or fewer"),
         (
             "damping.rayleigh={kind: ratios, frequencies: [9 Hz, 90 Hz], ratios: [1 %, 50 %]}",
-            "0.01 and 0.5: a factor below zero, which feeds other modes; allowed: the second from "
-            "0.1 to 10 times the first",
+            "0.01 and 0.5: one factor would be below zero and feed energy into other modes; "
+            "allowed: the second from 0.1 to 10 times the first",
         ),
         (
             "damping.rayleigh={kind: ratios, frequencies: [90 Hz, 9 Hz], ratios: [1 %, 2 %]}",
@@ -90,7 +90,7 @@ def test_dashpots_damp_in_time(tmp_path):
         ),
         (
             "damping.dashpots=[{points: m1, against: m1, coefficient: 1}]",
-            "structure.damping.dashpots.0.against: m1 against itself; allowed: others",
+            "structure.damping.dashpots.0.against: m1 joined to itself",
         ),
     ],
 )
@@ -103,5 +103,5 @@ def test_nonsense_is_refused_with_its_place(tmp_path, entry, message):
 def test_a_loss_factor_is_refused_in_time(tmp_path):
     code, told = refused(tmp_path, RIG_IN_TIME, "structure.damping.loss_factor=4 %")
     assert code == 2
-    assert "0.04: in steady vibration only; allowed: 0, and half of it as" in told
+    assert "0.04: only in steady vibration" in told
     assert "structure.damping_ratio" in told

@@ -306,7 +306,7 @@ class TestCase:
             (["wear.step.cycles=1e7"], "wear.step.cycles: steps of 1e+07 cycles"),
             (["wear.step.cycles=1"], "more than 20000 cycle blocks"),
             (["load_path.stroke=1e-9 mm"], "nothing slides at 87 N"),
-            (["load_path.normal_forces.1=1e-6 N"], "a single node of the pad touches"),
+            (["load_path.normal_forces.1=1e-6 N"], "only one node of the pad touches"),
         ],
     )
     def test_wear_that_cannot_be_is_one_line(self, folder, curved, overrides, message):

@@ -51,7 +51,7 @@ def test_a_run_proposes_grids_that_do(tmp_path, text, grid, size, across):
     done, (warning,) = run(tmp_path, text, coarse)
     assert done.exit_code == 0
     found, enough = across.split(", ")
-    assert f"the contact is {found} cells across, where {enough} resolve it" in warning
+    assert f"the contact is only {found} cells across, and {enough} are needed" in warning
     found = re.search(r"take (contact.grid: .*) or (contact.size: .*)", warning)
     for proposed in found.groups():
         _, warnings = run(tmp_path, text, coarse, proposed.replace(": ", "=", 1))
@@ -83,6 +83,6 @@ def test_one_that_has_worn_to_a_point_is_warned_of():
     assert told == []
     pressure[10, 10] = 1.0
     check_cells("pad", settings, grid, pressure, told, worn=True)
-    assert "pad is 1 x 1 cells across after wear" in told[0]
-    with pytest.raises(UserError, match="says nothing of its size"):
+    assert "pad is only 1 x 1 cells across after wear" in told[0]
+    with pytest.raises(UserError, match="its size and pressure are meaningless"):
         check_cells("pad", settings, grid, pressure, told)

@@ -36,7 +36,7 @@ def stopped(start, tmp_path_factory):
     assert run.ending.exit_code == 130
     last = run.ending.stderr.splitlines()[-1]
     assert last.startswith("fretscale: interrupted")
-    assert last.endswith(f"go on with `fretscale resume {run.folder}`")
+    assert last.endswith(f"continue with `fretscale resume {run.folder}`")
     return run
 
 
@@ -232,7 +232,7 @@ def test_run_whose_state_is_gone_begins_anew_and_says_so(interrupted, resume, wh
     (interrupted.folder / "checkpoint.h5").unlink()
     run = resume(interrupted.folder)
     assert_equal(run, whole)
-    assert "no state was kept: from the start" in run.ending.stderr
+    assert "no state was stored: from the start" in run.ending.stderr
 
 
 def refuse(*_):
@@ -242,8 +242,8 @@ def refuse(*_):
 @pytest.mark.parametrize(
     ("place", "told"),
     [
-        ("workflow.shell.folders.folder.OutputFolder.claim", "has nothing yet; start again with"),
-        ("workflow.runs.run.provenance_of", "keeps what is done; go on with `fretscale resume"),
+        ("workflow.shell.folders.folder.OutputFolder.claim", "is still empty; start again with"),
+        ("workflow.runs.run.provenance_of", "keeps what is done; continue with `fretscale resume"),
     ],
 )
 def test_ctrl_c_before_anything_is_computed_names_the_folder(
@@ -331,7 +331,7 @@ def test_workers_tell_what_they_have_done_before_they_answer():
 def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     """It ends while it receives its task: a large setting does not fit into the pipe at once."""
     monkeypatch.setattr(sys, "executable", "/bin/true")
-    gone = pytest.raises(MethodFailed, match="a process of the run has gone")
+    gone = pytest.raises(MethodFailed, match="a process of the run is gone")
     with closing(workers.WorkerProcess()) as beside, gone:
         beside.begin(len, bytes(1_000_000))()
 

@@ -205,7 +205,9 @@ def interrupt(small_path, folder, began, stop=Process.interrupt):
     code, text = process.finish()
     assert code == 130, text
     lines = [line for line in text.splitlines() if line.strip()]
-    assert lines[-1].startswith(f"fretscale: interrupted: {folder} keeps what is done; go on with")
+    assert lines[-1].startswith(
+        f"fretscale: interrupted: {folder} keeps what is done; continue with"
+    )
     # Before it only what the run itself had said: no traceback, nothing of the workers.
     assert [line for line in lines[:-1] if not line.startswith(("run: ", "warning: "))] == []
     assert wait_until(lambda: not any(map(alive, below)), PATIENCE)

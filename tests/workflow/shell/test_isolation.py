@@ -127,7 +127,7 @@ def test_what_only_shows_a_run_fails_and_the_run_does_not(what, whole, tmp_path,
     assert failed["responses"] == summary["responses"]
     (warning,) = set(failed["warnings"]) - set(summary["warnings"])
     assert warning.startswith(said)
-    assert "the results are whole" in warning
+    assert "the results are complete" in warning
     page = tmp_path / "out" / "report.html"
     assert page.exists() == (what != "report")
 

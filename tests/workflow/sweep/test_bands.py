@@ -184,10 +184,10 @@ def test_a_sweep_takes_the_parameters_of_a_fit(load):
     ("text", "changes", "words"),
     [
         ("", {}, "sweep.yaml:2: fit: in design: grid; allowed: design: sample"),
-        ("set: {structure.radius: 1 mm}\n", {}, "structure.radius: the fit gives it too"),
+        ("set: {structure.radius: 1 mm}\n", {}, "structure.radius: given by the fit, too"),
         ("", {"determined": False, "doubt": "at its bound"}, "not determined by the fit (at its"),
         ("", {"entries": None, "value": None}, "design: grid"),
-        ("", {"bounds": None}, "not what a fit tells"),
+        ("", {"bounds": None}, "no result of a fit"),
     ],
 )
 def test_fits_that_do_not_go_with_a_sweep(load, text, changes, words):

@@ -141,4 +141,4 @@ def test_a_worn_volume_has_the_band_of_its_coefficient(tmp_path):
     assert other["band"]["upper"] == pytest.approx(0.1 * exact, rel=1e-6)
     assert 0.0 < found["interface.depth_1"]["bent"] < 0.1
     assert found["interface.peak_pressure.worn"]["band"] is None
-    assert "not linear within 10%" in (tmp_path / "out" / "sweep.log").read_text("utf-8")
+    assert "not linear within 10 %" in (tmp_path / "out" / "sweep.log").read_text("utf-8")

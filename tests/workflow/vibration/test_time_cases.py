@@ -45,7 +45,7 @@ LAWS = ("bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan")
         (RIG, "ageing={energy: 1 J}|energies=[2 J]", "beyond the end"),
         (RIG, f"{HAMMER}|integration.step=20 us|ageing.energy=1 J", "with a harmonic force"),
         (RIG, f"{HAMMER}|excitation.band=[3 Hz, 2 Hz]", "not ascending"),
-        (RIG, f"{HAMMER}|excitation.record=1 ms", "over with the blow"),
+        (RIG, f"{HAMMER}|excitation.record=1 ms", "ends with the blow"),
     ],
 )
 def test_a_wrong_case_is_refused(text, override, words):
@@ -64,7 +64,7 @@ def test_evolution_of_what_the_joint_has_not_is_refused():
 def test_a_file_beside_a_factor_is_refused(tmp_path):
     (tmp_path / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
     evolution = "evolution={file: loops.csv, friction: {kind: linear, slope: 0}}"
-    with pytest.raises(CaseError, match="given beside friction"):
+    with pytest.raises(CaseError, match="given with friction"):
         parse_case(JOINT, str(tmp_path / "case.yaml"), [evolution])
 
 
@@ -282,7 +282,7 @@ def test_what_can_be_charted(tmp_path):
     with pytest.raises(UserError, match="does not apply to this case; allowed: step"):
         axes_of(path, [], ["grid"])
     path.write_text(JOINT, encoding="utf-8")
-    with pytest.raises(UserError, match="nothing of a case of this kind can be charted"):
+    with pytest.raises(UserError, match="a case of this kind has nothing to chart"):
         axes_of(path, [], [])
 
 

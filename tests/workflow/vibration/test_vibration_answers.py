@@ -90,7 +90,7 @@ def test_a_curve_that_does_not_get_there_says_so(tmp_path):
     summary = run(tmp_path, ONE_MASS, "at=[150 Hz]", "continuation.most_points=5")
     (answer,) = summary["responses"][0]["at"]
     assert answer["motions"] == []
-    assert answer["message"].startswith("none: the curve, from 80 to ")
+    assert answer["message"].startswith("none: the curve from 80 to ")
     assert any("at 150 Hz: none: the curve" in warning for warning in summary["warnings"])
 
 

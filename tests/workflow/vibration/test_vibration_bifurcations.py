@@ -110,4 +110,4 @@ def test_closed_branches_are_found_from_a_start(tmp_path: Any) -> None:
         assert branch["lowest_frequency"] == pytest.approx(184.07, rel=1e-3)
         assert branch["highest_frequency"] == pytest.approx(412.5, rel=1e-3)
     assert "closed" in told
-    assert "the fold at 392.1 Hz is none of the motion itself" in " ".join(told.split())
+    assert "the fold at 392.1 Hz is not one of the motion itself" in " ".join(told.split())

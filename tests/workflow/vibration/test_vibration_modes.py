@@ -70,7 +70,10 @@ def test_figure_has_a_row_for_each_mode(sliding):
 @pytest.mark.parametrize(
     ("asked", "why"),
     [
-        ("modes={amplitudes: [5 um, 1 um]}", "not ascending; allowed: the least, then the largest"),
+        (
+            "modes={amplitudes: [5 um, 1 um]}",
+            "not ascending; allowed: the smallest, then the largest",
+        ),
         ("modes={numbers: [1, 1], amplitudes: [1 um, 5 um]}", "a mode twice; allowed: each once"),
         ("modes={numbers: [], amplitudes: [1 um, 5 um]}", "modes.numbers"),
         ("modes={numbers: [0], amplitudes: [1 um, 5 um]}", "modes.numbers"),

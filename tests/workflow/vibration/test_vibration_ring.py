@@ -129,7 +129,7 @@ def test_blades_are_told_by_their_nodal_diameters(tmp_path):
                 "structure.driven=",
                 "excitation={base: [{kind: displacement, amplitude: 1}]}",
             ],
-            "excitation.base: a ground that moves drives all sectors at once",
+            "excitation.base: a moving ground drives all sectors at once",
         ),
         (
             ["structure={kind: rig, masses: [1 kg], springs: [1], damping_ratio: 0}"],

@@ -105,9 +105,9 @@ def test_a_stop_without_even_harmonics_is_doubted(tmp_path: Any) -> None:
     )
     path = tmp_path / "case.yaml"
     path.write_text(text, encoding="utf-8")
-    assert "without even ones" in invoke("check", path).output
+    assert "no even ones" in invoke("check", path).output
     path.write_text(text.replace("harmonics: 3", "harmonics: [0, 1, 2, 3]"), encoding="utf-8")
-    assert "without even ones" not in invoke("check", path).output
+    assert "no even ones" not in invoke("check", path).output
 
 
 def test_a_body_that_contacts_alone_hold_takes_little_memory() -> None:

@@ -49,4 +49,4 @@ def test_skewed_slots_have_no_cyclic_sides():
     case = CASES / "dovetail.yaml"
     ending = invoke("check", case, *settings(["structure.sides=cyclic", "structure.skew=5 deg"]))
     assert ending.exit_code == 2
-    assert "are no images of each other; allowed: guided, or skew 0" in ending.stderr
+    assert "are not images of each other; allowed: guided, or skew 0" in ending.stderr

@@ -268,7 +268,7 @@ HEADER = "P, Qx, Qy, Mx, My, Mz, Edx, Edy, block, share [%]\n"
 @pytest.mark.parametrize(
     ("rows", "told"),
     [
-        ([(1, 70), (1, 70), (2, 20)], "the shares of all blocks add up to 0.9; allowed: to 1"),
+        ([(1, 70), (1, 70), (2, 20)], "the shares of all blocks add up to 0.9"),
         ([(1, 70), (2, 30), (1, 70)], "a block that had ended"),
         ([(1, 70), (1, 60), (2, 30)], "share: 60: not as above; allowed: one in a block"),
         ([(1, 120), (2, -20)], "share: 120: out of range; allowed: 0 to 1"),

@@ -140,7 +140,7 @@ def test_a_run_goes_on_from_what_the_disk_keeps(coarse) -> None:
     ],
 )
 def test_what_nodes_know_nothing_of_is_refused(override: str, allowed: str) -> None:
-    with pytest.raises(CaseError, match=rf"not where nodes wear .*; allowed: {allowed}"):
+    with pytest.raises(CaseError, match=rf"not available where nodes wear .*; allowed: {allowed}"):
         load_case(PLANE, (*NODES, override))
 
 

@@ -297,7 +297,7 @@ def test_constant_resultants_never_drift(start, whole, tmp_path):
     [
         (
             ["wear.step.kind=explicit", "wear.step.cycles=5e5", "friction.coefficient=1.2"],
-            ["amplify the grid's roughness", "locks itself"],
+            ["amplify the roughness", "the joint locks"],
         ),
         (
             [

@@ -159,7 +159,7 @@ def test_half_a_face_takes_scans_that_are_their_own_image(tmp_path):
         assert gap == pytest.approx(whole[place], abs=1e-12)
     said = refused(with_surfaces(path, body_1={"file": "slope.npy", **scan}))
     assert "body_1.file: " in said
-    assert "slope.npy: not the same on both sides of the plane of symmetry across x" in said
+    assert "slope.npy: not symmetric about the plane of symmetry across x" in said
 
 
 @pytest.mark.slow

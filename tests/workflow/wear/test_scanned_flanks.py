@@ -124,7 +124,7 @@ def test_planes_are_exact_on_flanks(tmp_path):
     [
         (PLANE, 9, "title=A profile", "disk.npy: a scan of 9 columns: give a profile, of one"),
         (SPACE, 9, "title=Too short", "ends within the grid of 12 mm x 60 mm: take a smaller"),
-        (PLANE, 1, "fidelity=auto", "two dimensions and three, and surfaces as measured are of"),
+        (PLANE, 1, "fidelity=auto", "measured surfaces belong to"),
     ],
 )
 def test_surfaces_that_do_not_suit_a_flank_are_refused(tmp_path, case, columns, change, words):
@@ -146,7 +146,7 @@ def test_a_run_wears_what_was_measured(tmp_path):
     changes = [surfaces(intrados={"blade": blade}), *coarse, *quiet, "error_budget=known"]
     ended = invoke("run", SPACE, "--out", out, *settings(changes))
     assert ended.exit_code in (0, 1), ended.stderr
-    assert "the section by which increments are chosen" in (out / "run.log").read_text("utf-8")
+    assert "the section that chooses increments" in (out / "run.log").read_text("utf-8")
     heights = []
     for unworn in (["--unworn"], []):
         file = tmp_path / f"blade{len(unworn)}.npz"

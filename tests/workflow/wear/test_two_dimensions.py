@@ -21,6 +21,7 @@ from workflow.analyses.wear.fidelity import choosing
 from workflow.analyses.wear.fidelity.decisions import choose_dimension
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import face_contact
+from workflow.case.text.readable import percent
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError, MethodFailed
 from workflow.kinds import load_case
@@ -229,7 +230,7 @@ def test_uniformity_of_a_slot(slot):
     mean = source.unworn()[0].loads.P[source.peak] / stages[0].grid.size[1]
     assert one.mean_load == pytest.approx(mean / rows.middle["P"], rel=1e-6)
     assert 0.0 < one.share_of_length_within < 1.0
-    assert f"{one.share_of_length_within:.0%}" in one.sentence("intrados")
+    assert percent(one.share_of_length_within) in one.sentence("intrados")
 
 
 def test_what_has_worn_unevenly_is_not_uniform(slot):
@@ -287,7 +288,7 @@ def test_dimension_follows_the_accuracy(plane_path, accuracy, dimension):
     (decision,) = record["decisions"]
     largest = max(v for flank in decision["probe"]["differences"].values() for v in flank.values())
     assert (largest <= case.accuracy) == (dimension == 2)
-    assert f"{largest:.1%}" in decision["why"]
+    assert percent(largest) in decision["why"]
     # Whatever the case says itself, the same is chosen, and a case so written stands.
     structure = case.structure.model_copy(update={"dimension": 2})
     assert ANALYSIS.choose(case.model_copy(update={"structure": structure}))[0] == chosen

@@ -86,7 +86,7 @@ def test_a_run_that_was_broken_off_takes_its_finished_wear(folder):
     summary.unlink()
     ended = run(folder, WEAR)
     assert ended.exit_code == 0, ended.output
-    assert "as an earlier run has left it" in ended.output
+    assert "taken from the earlier run in" in ended.output
     assert wear.stat().st_mtime_ns == finished
     assert json.loads(summary.read_text())["states"] == first["states"]
 
@@ -95,7 +95,7 @@ def test_a_run_that_was_broken_off_takes_its_finished_wear(folder):
     ("wear", "words"),
     [
         (BALL, "no case of wear with loops"),
-        (WEAR.replace("loops: {amplitude: 10 um}\n", ""), "leaves no table of loops"),
+        (WEAR.replace("loops: {amplitude: 10 um}\n", ""), "writes no table of loops"),
         (WEAR.replace("P: 50 N", "P: 50 mm"), "load_path.P"),
     ],
 )

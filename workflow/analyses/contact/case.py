@@ -56,9 +56,9 @@ PLANE, HEIGHTS = "plane", "heights"
 class Bodies(Section):
     """Two bodies without finite elements."""
 
-    kind: Literal["bodies"] = entry("what the structure is", "bodies")
+    kind: Literal["bodies"] = entry("kind of structure", "bodies")
     shape: str  # each narrows it to its name
-    surfaces: MeasuredSurfaces | None = entry("as measured, on top of the shape", default=None)
+    surfaces: MeasuredSurfaces | None = entry("measured heights, added to the shape", default=None)
 
     @property
     def text(self) -> str:
@@ -90,7 +90,7 @@ class Plane(Shape):
     """No form of its own: the whole form is in the measured surfaces."""
 
     shape: Literal["plane"] = entry("a plane all over the grid", "plane")
-    surfaces: MeasuredSurfaces = entry("as measured, with all of their form")
+    surfaces: MeasuredSurfaces = entry("measured heights, with their whole form")
 
     def height(self, x: Array, y: Array) -> Array:
         return np.zeros_like(x + y)
@@ -100,7 +100,7 @@ class Sphere(Shape):
     """Hertz's paraboloid (x² + y²) / 2 R."""
 
     shape: Literal["sphere"] = entry("sphere, ellipsoid, plane or heights", "sphere")
-    radius: RoundingRadius = entry("relative, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
+    radius: RoundingRadius = entry("relative radius, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
 
     def height(self, x: Array, y: Array) -> Array:
         return (x**2 + y**2) / (2.0 * self.radius)
@@ -110,8 +110,8 @@ class Ellipsoid(Shape):
     """Paraboloid x² / 2 Rx + y² / 2 Ry."""
 
     shape: Literal["ellipsoid"] = entry("sphere, ellipsoid, plane or heights", "ellipsoid")
-    radius_x: RoundingRadius = entry("relative, of the section along x [mm]", "10 mm")
-    radius_y: RoundingRadius = entry("relative, of the section along y [mm]", "20 mm")
+    radius_x: RoundingRadius = entry("relative radius of the section along x [mm]", "10 mm")
+    radius_y: RoundingRadius = entry("relative radius of the section along y [mm]", "20 mm")
 
     def height(self, x: Array, y: Array) -> Array:
         return x**2 / (2.0 * self.radius_x) + y**2 / (2.0 * self.radius_y)
@@ -121,7 +121,7 @@ class Cylinder(Shape):
     """Parabola x² / 2 R, constant along y: a line contact."""
 
     shape: Literal["cylinder"] = entry("cylinder, flat_rounded, plane or heights", "cylinder")
-    radius: RoundingRadius = entry("relative, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
+    radius: RoundingRadius = entry("relative radius, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
 
     def height(self, x: Array, y: Array) -> Array:
         return x**2 / (2.0 * self.radius)
@@ -133,8 +133,8 @@ class FlatRounded(Shape):
     shape: Literal["flat_rounded"] = entry(
         "cylinder, flat_rounded, plane or heights", "flat_rounded"
     )
-    half_width: Length = entry("of the flat [mm]", "4 mm")
-    edge_radius: RoundingRadius = entry("of the parabola beyond it [mm]", "10 mm")
+    half_width: Length = entry("half width of the flat [mm]", "4 mm")
+    edge_radius: RoundingRadius = entry("radius of the parabola beyond the flat [mm]", "10 mm")
 
     def height(self, x: Array, y: Array) -> Array:
         beyond = np.maximum(np.abs(x) - self.half_width, 0.0)
@@ -146,7 +146,7 @@ class Heights(Bodies):
 
     shape: Literal["heights"] = entry("heights: the gap before loading from a file", "heights")
     file: Annotated[str, File((".npy", ".csv", ".h5"))] = entry(
-        "gap in mm, a value per cell; for .h5 with :dataset at the end", "gap.npy"
+        "file with the gap in mm, one value per cell; for .h5 add :dataset", "gap.npy"
     )
 
     def form_on(self, grid: Grid) -> Array:
@@ -159,7 +159,7 @@ class BodyMaterial(ElasticSection):
     young: Stress = entry("Young's modulus [MPa]", "115 GPa")
     poisson: Poisson = entry("Poisson's ratio [1]", 0.29)
     yield_stress: Stress | None = entry(
-        "pressures above it are warned of; without it none [MPa]", "900 MPa", default=None
+        "a run warns of pressures above it; without it never [MPa]", "900 MPa", default=None
     )
 
 
@@ -228,15 +228,15 @@ class HalfSpaceGrid(Section):
 
     grid: object  # each dimension narrows the cells and the size
     size: object
-    tolerance: Tolerance = entry("relative, of every residual [1]", 1e-8, default=1e-8)
+    tolerance: Tolerance = entry("relative tolerance of every residual [1]", 1e-8, default=1e-8)
     history: Literal["auto", "full", "reversals"] = entry(
-        "auto: the cheapest that is accurate; full: all increments; reversals: turning points",
+        "auto: the cheapest that is accurate; full: all increments; reversals: only turning points",
         "auto",
         default="auto",
     )
     accuracy: Annotated[float, Quantity("1", at_least=1e-6, at_most=1.0)] = entry(
-        "of shear over µP and of energy that increments may leave: auto splits them, full warns "
-        "[1]",
+        "error of shear (over µP) and energy that increments may cause: auto splits them, full "
+        "warns [1]",
         "2 %",
         default=0.02,
     )
@@ -250,11 +250,11 @@ class ContactGrid(HalfSpaceGrid):
     """Half-space solution on a grid centred on the bodies."""
 
     grid: tuple[GridCells, GridCells] = entry(
-        "cells along x, along y; of heights as many as their file has",
+        "number of cells along x, along y; for heights as many as in their file",
         [128, 128],
         default=(128, 128),
     )
-    size: tuple[Length, Length] = entry("of the grid along x, along y [mm]", ["1 mm", "1 mm"])
+    size: tuple[Length, Length] = entry("size of the grid along x, along y [mm]", ["1 mm", "1 mm"])
 
     def centred(self) -> Grid:
         return Grid.covering(self.size, self.grid)
@@ -264,11 +264,11 @@ class LineContactGrid(HalfSpaceGrid):
     """Half-plane solution on cells of a line contact, centred on the bodies."""
 
     grid: LineCells = entry(
-        "strips along x; of heights as many as their file has", 512, default=(512, 1)
+        "number of cells along x; for heights as many as in their file", 512, default=(512, 1)
     )
-    size: Length = entry("of the grid along x [mm]", "2 mm")
+    size: Length = entry("size of the grid along x [mm]", "2 mm")
     datum: Length | None = entry(
-        "depth at which displacements vanish; without it twice the size [mm]",
+        "depth at which displacements vanish; default: twice the size [mm]",
         "50 mm",
         default=None,
     )
@@ -292,11 +292,11 @@ class LineContactGrid(HalfSpaceGrid):
 class BodiesCase(Case):
     """Two bodies in contact, over an area or along a line."""
 
-    analysis: Literal["contact"] = entry("what is computed", "contact")
+    analysis: Literal["contact"] = entry("kind of analysis", "contact")
     structure: Bodies
     materials: BodyMaterials = entry("the two bodies in contact")
     friction: Friction = entry(
-        "Coulomb's law; like bodies that are only pressed do without",
+        "Coulomb's law; not needed if similar bodies are only pressed",
         default=Friction(coefficient=0.0),
     )
     load_path: LegsOrFile
@@ -310,7 +310,7 @@ class BodiesCase(Case):
         pair = ElasticPair(elastic(self.materials.body_1), elastic(self.materials.body_2))
         sheared = sorted(set(self.load_path.table().columns) - set(PRESSING))
         if sheared or not pair.similar:
-            why = f"load_path has {', '.join(sheared)}" if sheared else "unlike bodies rub"
+            why = f"load_path has {', '.join(sheared)}" if sheared else "dissimilar bodies rub"
             raise disagreement(f"missing, but {why}; allowed: a coefficient, or 0", "friction")
         return self
 
@@ -328,7 +328,7 @@ class BodiesCase(Case):
         kind = "no finite elements"
         cells = f"{nx} x {ny} cells of {plain(dx, 'mm', 4)} x {plain(dy, 'mm', 4)}"
         if grid.line:
-            kind, cells = "line contact", f"{nx} strips of {plain(dx, 'mm', 4)}"
+            kind, cells = "line contact", f"{nx} cells of {plain(dx, 'mm', 4)}"
         count = f"{len(table)} increment{'s' if len(table) > 1 else ''}"
         return [
             ("structure", f"{self.structure.text}, {kind}"),
@@ -369,7 +369,7 @@ class ContactCase(BodiesCase):
     structure: Annotated[Sphere | Ellipsoid | Plane | Heights, Field(discriminator="shape")] = (
         entry("the bodies: no finite elements")
     )
-    load_path: ContactPath = entry("forces or motions, in turn")
+    load_path: ContactPath = entry("forces or motions, one leg after the other")
     contact: ContactGrid = entry("half-space grid")
 
     @classmethod
@@ -386,7 +386,7 @@ class LineContactCase(BodiesCase):
     structure: Annotated[Cylinder | FlatRounded | Plane | Heights, Field(discriminator="shape")] = (
         entry("the bodies: no finite elements")
     )
-    load_path: LineContactPath = entry("forces or motions per length, in turn")
+    load_path: LineContactPath = entry("forces or motions per length, one leg after the other")
     contact: LineContactGrid = entry("half-plane grid")
 
     @classmethod

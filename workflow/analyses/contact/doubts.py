@@ -33,10 +33,16 @@ def about_grid(width: float, sides: Sequence[float], cells: Sequence[int]) -> It
     """Warn about a grid that is too small or too coarse for an unworn contact of ``width`` [mm]."""
     shown = f"the contact is about {plain(width, 'mm', 3)} wide"
     if width > min(sides):
-        yield f"contact.size: {plain(min(sides), 'mm')}, but {shown}: take a larger one"
+        yield (
+            f"contact.size: {plain(min(sides), 'mm')} is smaller than the contact ({shown}): take "
+            "a larger one"
+        )
     pitch = max(side / count for side, count in zip(sides, cells, strict=False) if count > 1)
     if width < FEWEST * pitch:
-        yield f"contact.size: cells of {plain(pitch, 'mm', 3)}, but {shown}: take a smaller one"
+        yield (
+            f"contact.size: cells of {plain(pitch, 'mm', 3)} are too large ({shown}): take a "
+            "smaller size, or more cells in contact.grid"
+        )
 
 
 def about_shear(path: str, table: LoadTable, friction: float, unit: str) -> Iterator[str]:
@@ -50,11 +56,11 @@ def about_shear(path: str, table: LoadTable, friction: float, unit: str) -> Iter
     names = " and ".join(sorted(forces))
     if shear[largest] > (1.0 + ROUNDING) * carried[largest]:
         yield (
-            f"{path}: {names} of {plain(float(shear[largest]), unit, 3)}, where friction carries "
-            f"{plain(float(carried[largest]), unit, 3)}: the run would end there"
+            f"{path}: {names} of {plain(float(shear[largest]), unit, 3)} exceed what friction "
+            f"carries, {plain(float(carried[largest]), unit, 3)}: the run would end there"
         )
     elif 0.0 < shear.max() < HARDLY * carried.max():
         yield (
-            f"{path}: {names} up to {plain(float(shear.max()), unit, 3)}, where friction carries "
-            f"{plain(float(carried.max()), unit, 3)}: is the unit right?"
+            f"{path}: {names} up to {plain(float(shear.max()), unit, 3)} are far below what "
+            f"friction carries, {plain(float(carried.max()), unit, 3)}: is the unit right?"
         )

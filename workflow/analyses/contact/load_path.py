@@ -52,44 +52,46 @@ class Leg(Section):
     """
 
     P: NormalForce | None = entry("normal force [N]", "60 N", default=None)
-    approach: Travel | None = entry("instead of P [mm]", "13 um", default=None)
+    approach: Travel | None = entry("approach, instead of P [mm]", "13 um", default=None)
     Qx: Force | None = entry("tangential force along x [N]", "15 N", default=None)
-    shift_x: Travel | None = entry("instead of Qx [mm]", "5 um", default=None)
+    shift_x: Travel | None = entry("motion along x, instead of Qx [mm]", "5 um", default=None)
     Qy: Force | None = entry("tangential force along y [N]", "0 N", default=None)
-    shift_y: Travel | None = entry("instead of Qy [mm]", "0 um", default=None)
+    shift_y: Travel | None = entry("motion along y, instead of Qy [mm]", "0 um", default=None)
     Mx: Moment | None = entry("moment of the pressure about x [N*mm]", "0 N*mm", default=None)
-    tilt_x: Turn | None = entry("instead of Mx [rad]", "0 deg", default=None)
+    tilt_x: Turn | None = entry("rotation about x, instead of Mx [rad]", "0 deg", default=None)
     My: Moment | None = entry("moment of the pressure about y [N*mm]", "0 N*mm", default=None)
-    tilt_y: Turn | None = entry("instead of My [rad]", "0 deg", default=None)
+    tilt_y: Turn | None = entry("rotation about y, instead of My [rad]", "0 deg", default=None)
     Mz: Moment | None = entry("moment of the shear [N*mm]", "10 N*mm", default=None)
-    twist: Turn | None = entry("instead of Mz [rad]", "0.01 deg", default=None)
+    twist: Turn | None = entry("rotation about z, instead of Mz [rad]", "0.01 deg", default=None)
     bulk_stress_1: BulkStress | None = entry(
-        "along x in body 1, held from straining along y [MPa]", "100 MPa", default=None
+        "bulk stress along x in body 1, which is held along y [MPa]", "100 MPa", default=None
     )
     bulk_stress_2: BulkStress | None = entry(
-        "along x in body 2, held from straining along y [MPa]", "0 MPa", default=None
+        "bulk stress along x in body 2, which is held along y [MPa]", "0 MPa", default=None
     )
-    increments: Increments = entry("equal steps to the end of this leg", 1, default=1)
+    increments: Increments = entry("number of equal steps to the end of this leg", 1, default=1)
 
 
 class LineLeg(Section):
     """A part of the path of a line contact; forces and moments are per length."""
 
     P: NormalLineForce | None = entry("normal force [N/mm]", "400 N/mm", default=None)
-    approach: Travel | None = entry("instead of P, see contact.datum [mm]", "13 um", default=None)
+    approach: Travel | None = entry(
+        "approach, instead of P; see contact.datum [mm]", "13 um", default=None
+    )
     Qx: LineForce | None = entry("tangential force along x [N/mm]", "100 N/mm", default=None)
-    shift_x: Travel | None = entry("instead of Qx [mm]", "5 um", default=None)
+    shift_x: Travel | None = entry("motion along x, instead of Qx [mm]", "5 um", default=None)
     Qy: LineForce | None = entry("tangential force along y [N/mm]", "0 N/mm", default=None)
-    shift_y: Travel | None = entry("instead of Qy [mm]", "0 um", default=None)
+    shift_y: Travel | None = entry("motion along y, instead of Qy [mm]", "0 um", default=None)
     My: LineMoment | None = entry("moment of the pressure about y [N]", "0 N", default=None)
-    tilt_y: Turn | None = entry("instead of My [rad]", "0 deg", default=None)
+    tilt_y: Turn | None = entry("rotation about y, instead of My [rad]", "0 deg", default=None)
     bulk_stress_1: BulkStress | None = entry(
-        "along x in body 1, in plane strain [MPa]", "100 MPa", default=None
+        "bulk stress along x in body 1, in plane strain [MPa]", "100 MPa", default=None
     )
     bulk_stress_2: BulkStress | None = entry(
-        "along x in body 2, in plane strain [MPa]", "0 MPa", default=None
+        "bulk stress along x in body 2, in plane strain [MPa]", "0 MPa", default=None
     )
-    increments: Increments = entry("equal steps to the end of this leg", 1, default=1)
+    increments: Increments = entry("number of equal steps to the end of this leg", 1, default=1)
 
 
 HistoryFile = Annotated[str, File((".csv",))]
@@ -103,9 +105,10 @@ class LegsOrFile(Section, Generic[LegT]):
     closed: ClassVar[bool] = False
     in_schema: ClassVar[Mapping[str, Any]] = one_of("legs", "file")
 
-    legs: tuple[LegT, ...] = entry("one after the other, from no load", default=())
+    legs: tuple[LegT, ...] = entry("legs, one after the other, from no load", default=())
     file: HistoryFile | None = entry(
-        "instead of legs: columns named like their entries, a row per increment, base units",
+        "CSV instead of legs: a row per increment, columns named like the entries of a leg, "
+        "base units",
         "history.csv",
         default=None,
     )

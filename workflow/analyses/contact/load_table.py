@@ -69,7 +69,7 @@ def conflict(named: Container[str]) -> tuple[str, str] | None:
     """Return entry and message of a conflict among the columns ``named``, None without one."""
     for force, motion in zip(FORCES, MOTIONS, strict=True):
         if force in named and motion in named:
-            return motion, f"given beside {force}; allowed: one of them on the whole path"
+            return motion, f"given together with {force}; allowed: one of them on the whole path"
     if "P" not in named and "approach" not in named:
         return "P", "neither P nor approach is given; allowed: one of them on the whole path"
     return None

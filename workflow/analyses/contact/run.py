@@ -15,6 +15,7 @@ from workflow.analyses.contact.output.results import (
     write_contact_output,
     write_contact_results,
 )
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.few_cells import check_cells
 from workflow.shell.folders.folder import OutputFolder
@@ -103,7 +104,7 @@ def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
     _warn_of_increments(outcome, reporter)
     if any(state.border_load > 0.0 for state in states):
         reporter.warn(
-            "the contact touches the border of its grid, where it is cut off: raise contact.size"
+            "the contact touches the border of its grid and is cut off there: raise contact.size"
         )
     highest = max(float(state.traction[2].max()) for state in states)
     yield_stress = min(body.yield_stress for body in bodies_of(outcome.case))
@@ -123,11 +124,11 @@ def _warn_of_increments(outcome: ContactOutcome, reporter: Reporter) -> None:
     place = case.load_path.place(history.error_at)
     left = []
     if history.energy_error > accuracy:
-        left.append(f"{history.energy_error:.1%} of the energy dissipated")
+        left.append(f"{percent(history.energy_error)} of the dissipated energy")
     if history.error > accuracy:
         left.append(
-            f"{history.error:.1%} of friction as an error of the shear, largest at increment "
-            f"{history.error_at + 1}"
+            f"{percent(history.error)} of µP in the shear (largest at increment "
+            f"{history.error_at + 1})"
         )
     if not left:
         return
@@ -135,8 +136,10 @@ def _warn_of_increments(outcome: ContactOutcome, reporter: Reporter) -> None:
     if history.method != "full":
         shorter = "take all increments (contact.history: full)"
     elif case.contact.history == "full":
-        shorter = f"take contact.history: auto, which splits them, or more of them ({place})"
+        shorter = (
+            f"take contact.history: auto, which splits increments, or more increments ({place})"
+        )
     reporter.warn(
-        f"the increments of the load leave about {' and '.join(left)}, above contact.accuracy of "
-        f"{accuracy:.1%}: {shorter}"
+        f"the increments of the load cause errors of about {' and '.join(left)}, above "
+        f"contact.accuracy of {percent(accuracy)}: {shorter}"
     )

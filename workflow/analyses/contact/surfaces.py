@@ -46,43 +46,43 @@ class MeasuredSurface(Section):
     also_filled_in: ClassVar[tuple[str, ...]] = ("unit", "pitch")
 
     file: Annotated[str, File(ENDINGS)] = entry(
-        "of a profilometer (.sur, .x3p, .al3d, .plu, ...), x, y, z (.csv, .txt, .xyz), or bare "
-        "heights (.npy, .csv, .txt; with a colon .npz:array, .h5:dataset)",
+        "scan of a profilometer (.sur, .x3p, .al3d, .plu, ...), x, y, z (.csv, .txt, .xyz), or "
+        "bare heights (.npy, .csv, .txt; with a colon .npz:array, .h5:dataset)",
         "disk.npy",
     )
     unit: Annotated[str, Word(UNITS)] | None = entry(
-        "of bare heights, or of x, y, z without headings: m, mm, um or nm; other files say it",
+        "unit of bare heights, or of x, y, z without headings: m, mm, um or nm; other files "
+        "state it",
         "um",
         default=None,
     )
     pitch: tuple[Length, Length] | None = entry(
-        "of bare heights along x, along y; other files say it [mm]",
+        "distance of the points of bare heights along x, along y; other files state it [mm]",
         ["20 um", "20 um"],
         default=None,
     )
     level: Level = entry(
-        "what is taken off: none, mean, plane, or form (second order)", "plane", default="plane"
+        "what is subtracted: none, mean, plane, or form (second order)", "plane", default="plane"
     )
     missing: Share = entry(
-        "share of points that may be: they are laid over those around by a membrane [1]",
+        "share of points that may be missing: they are filled in by a membrane over their "
+        "neighbours [1]",
         "5 %",
         default=0.05,
     )
     flipped: StrictBool = entry(
-        "whether it is seen through the body, so that its columns run against y",
+        "true if it is seen through the body, so that its columns run against y",
         False,
         default=False,
     )
     shift: tuple[Shift, Shift] = entry(
-        "where its middle lies from that of the contact's grid, along x, along y [mm]",
+        "place of its middle from the middle of the contact's grid, along x, along y [mm]",
         [0, 0],
         default=(0.0, 0.0),
     )
-    angle: Angle = entry(
-        "how far it is turned on the face, from x to y [rad]", "0 deg", default=0.0
-    )
+    angle: Angle = entry("rotation on the face, from x to y [rad]", "0 deg", default=0.0)
     beyond: Beyond = entry(
-        "its border the grid finds nothing (refused), or the scan mirrored",
+        "beyond its border the grid finds nothing (refused), or the mirrored scan",
         "refused",
         default="refused",
     )
@@ -230,8 +230,8 @@ class SurfacesOfTwo(Section):
             if height > SMOOTH and numbers["lost"] > LOST * height:
                 lost = f"{plain(numbers['lost'], 'mm', 3)} of {plain(height, 'mm', 3)} rms"
                 yield (
-                    f"{key}.{name}: {lost} is finer than the cells, which do not carry it: take "
-                    "more of them"
+                    f"{key}.{name}: {lost} is finer than the cells, which cannot carry it: take "
+                    "more cells"
                 )
 
 
@@ -242,9 +242,11 @@ class MeasuredSurfaces(SurfacesOfTwo):
     also_filled_in: ClassVar[tuple[str, ...]] = ("body_1",)
     in_schema: ClassVar[Mapping[str, Any]] = one_of("body_1", "body_2")
 
-    body_1: MeasuredSurface | None = entry("of the lower body, seen from above", default=None)
+    body_1: MeasuredSurface | None = entry(
+        "surface of the lower body, seen from above", default=None
+    )
     body_2: MeasuredSurface | None = entry(
-        "of the upper body, seen from below: turned over about x", default=None
+        "surface of the upper body, seen from below: turned over about x", default=None
     )
 
 

@@ -17,8 +17,8 @@ from workflow.case.text.plain import counted, shares
 DampingRatio = Annotated[float, Quantity("1", at_least=0.0, below=1.0)]
 DampingRatios = Annotated[tuple[DampingRatio, ...], OrAlone(), Field(min_length=1, max_length=999)]
 OF_MODES = (
-    "of every mode; or a list from the lowest mode on, rigid motions included, whose last is that "
-    "of all beyond [1]"
+    "damping ratio of every mode; or a list from the lowest mode on, rigid motions included, "
+    "whose last value holds for all further modes [1]"
 )
 AnyRatio = Annotated[float, Quantity("1", at_least=0.0, at_most=10.0)]
 ModeFrequency = Annotated[float, Quantity("Hz", above=0.0, at_most=1e7)]
@@ -29,10 +29,10 @@ class RayleighFactors(Section):
 
     kind: Literal["factors"] = entry("factors or ratios", "factors")
     mass_factor: Annotated[float, Quantity("1/s", at_least=0.0, at_most=1e8)] = entry(
-        "of the mass [1/s]", "2 1/s"
+        "factor of the mass [1/s]", "2 1/s"
     )
     stiffness_factor: Annotated[float, Quantity("s", at_least=0.0, at_most=1e3)] = entry(
-        "of the stiffness [s]", "5 us"
+        "factor of the stiffness [s]", "5 us"
     )
 
     @property
@@ -46,9 +46,11 @@ class RayleighRatios(Section):
 
     kind: Literal["ratios"] = entry("two damping ratios", "ratios")
     frequencies: tuple[ModeFrequency, ModeFrequency] = entry(
-        "at which damping is known, ascending [Hz]", ["40 Hz", "200 Hz"]
+        "frequencies at which damping is known, ascending [Hz]", ["40 Hz", "200 Hz"]
     )
-    ratios: tuple[AnyRatio, AnyRatio] = entry("damping ratios there [1]", ["0.5 %", "1 %"])
+    ratios: tuple[AnyRatio, AnyRatio] = entry(
+        "damping ratios at these frequencies [1]", ["0.5 %", "1 %"]
+    )
 
     @model_validator(mode="after")
     def _damps_everywhere(self) -> RayleighRatios:
@@ -57,8 +59,9 @@ class RayleighRatios(Section):
             raise disagreement("not ascending; allowed: lower, then upper", "frequencies")
         if not low / high * first <= second <= high / low * first:
             raise disagreement(
-                f"{first:g} and {second:g}: a factor below zero, which feeds other modes; allowed: "
-                f"the second from {low / high:.3g} to {high / low:.3g} times the first",
+                f"{first:g} and {second:g}: one factor would be below zero and feed energy into "
+                f"other modes; allowed: the second from {low / high:.3g} to {high / low:.3g} "
+                "times the first",
                 *("ratios", "frequencies"),
             )
         return self
@@ -80,9 +83,11 @@ class Dashpot(Against):
     against: Title | None = entry(
         "other points, as many, or one for all; without it the ground", "m2", default=None
     )
-    direction: Direction = entry("along which it acts: x, y, z, -x, -y or -z", "x", default="x")
+    direction: Direction = entry(
+        "direction along which it acts: x, y, z, -x, -y or -z", "x", default="x"
+    )
     coefficient: Annotated[float, Quantity("N*s/mm", at_least=0.0, at_most=1e9)] = entry(
-        "force over velocity, of all of them together [N*s/mm]", "20 N*s/m"
+        "force over velocity, of all dashpots together [N*s/mm]", "20 N*s/m"
     )
 
 
@@ -90,15 +95,15 @@ class Damping(Section):
     """Damping of the structure without its joints, in addition to the modal damping."""
 
     rayleigh: Annotated[RayleighFactors | RayleighRatios, Field(discriminator="kind")] | None = (
-        entry("in proportion to mass and stiffness", default=None)
+        entry("damping in proportion to mass and stiffness", default=None)
     )
     loss_factor: Annotated[float, Quantity("1", at_least=0.0, at_most=2.0)] = entry(
-        "structural damping: imaginary part of the stiffness over the real one; in steady "
-        "vibration only [1]",
+        "structural damping: imaginary over real part of the stiffness; in steady vibration only "
+        "[1]",
         0,
         default=0.0,
     )
-    dashpots: tuple[Dashpot, ...] = entry("between places, or to the ground", default=())
+    dashpots: tuple[Dashpot, ...] = entry("dashpots between points, or to the ground", default=())
 
     @property
     def parts(self) -> Iterator[str]:

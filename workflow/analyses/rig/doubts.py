@@ -37,8 +37,8 @@ def about_modes(
         shown = (", ".join(f"{f:.3g}" for f in frequencies) for frequencies in (opened, stuck))
         free, held = shown
         yield (
-            f"{path}: no mode of the rig is near: they are at {free} Hz with an open joint, at "
-            f"{held} Hz with a stuck one; are masses, springs and stiffness in the units meant?"
+            f"{path}: no mode of the rig is near: they are at {free} Hz with an open joint and at "
+            f"{held} Hz with a stuck one; are the units of masses, springs and stiffness right?"
         )
 
 

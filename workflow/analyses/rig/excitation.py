@@ -35,8 +35,8 @@ RECORDED = {
 class PrescribedMotion(Section):
     """An alternating displacement imposed on the joint."""
 
-    stroke: Length = entry("of the joint, peak to peak [mm]", "14 um")
-    frequency: Frequency = entry("of the cycles [Hz]", "100 Hz")
+    stroke: Length = entry("stroke of the joint, peak to peak [mm]", "14 um")
+    frequency: Frequency = entry("frequency of the cycles [Hz]", "100 Hz")
 
 
 class ForceOnMass(Section):
@@ -44,7 +44,7 @@ class ForceOnMass(Section):
 
     kind: str  # named first; each narrows it to its own name
     mass: MassNumber | None = entry(
-        "of a row, that is driven, counted from the ground; without it the first", 1, default=None
+        "driven mass of a row, counted from the ground; without it the first", 1, default=None
     )
 
 
@@ -53,14 +53,15 @@ class Harmonic(ForceOnMass):
 
     kind: Literal["harmonic"] = entry("harmonic, hammer or recorded", "harmonic")
     force: DrivingForce = entry("amplitude [N]", "75 N")
-    frequency: Frequency = entry("of the force [Hz]", "100 Hz")
+    frequency: Frequency = entry("frequency of the force [Hz]", "100 Hz")
     steady: Change = entry(
-        "change of the energy and the stroke from one cycle to the next that counts as none [1]",
+        "change of energy and stroke from one cycle to the next below which the state is "
+        "steady [1]",
         1e-4,
         default=1e-4,
     )
     periods: Annotated[int, Whole(2, 100_000)] = entry(
-        "after which there is no steady state", 2000, default=2000
+        "number of cycles after which the search for a steady state ends", 2000, default=2000
     )
 
 
@@ -69,19 +70,21 @@ class Hammer(ForceOnMass):
 
     kind: Literal["hammer"] = entry("half a sine of force", "hammer")
     force: DrivingForce = entry("largest [N]", "100 N")
-    duration: Time = entry("of the blow [s]", "0.4 ms")
-    record: Time = entry("length of what is recorded [s]", "1 s")
+    duration: Time = entry("duration of the blow [s]", "0.4 ms")
+    record: Time = entry("length of the record [s]", "1 s")
     band: tuple[Frequency, Frequency] = entry(
-        "about the first mode, for its frequency and damping against amplitude [Hz]",
+        "band around the first mode, for its frequency and damping against amplitude [Hz]",
         ["20 Hz", "500 Hz"],
     )
-    highest: Frequency = entry("of the frequency response [Hz]", "3 kHz", default=3000.0)
+    highest: Frequency = entry(
+        "highest frequency of the frequency response [Hz]", "3 kHz", default=3000.0
+    )
 
     @model_validator(mode="after")
     def _can_be_seen(self) -> Hammer:
         if self.record <= 2.0 * self.duration:
             raise disagreement(
-                f"{self.record:g} s: over with the blow; allowed: many times the duration",
+                f"{self.record:g} s: ends with the blow; allowed: many times the duration",
                 *("record", "duration"),
             )
         low, high = self.band
@@ -89,8 +92,8 @@ class Hammer(ForceOnMass):
             raise disagreement("not ascending; allowed: lower, then upper end", "band")
         if self.highest > SEEN / self.duration:
             raise disagreement(
-                f"{self.highest:g} Hz: 1.5/duration is not in a blow of {self.duration:g} s; "
-                f"allowed: up to {SEEN / self.duration:g} Hz, or a shorter blow",
+                f"{self.highest:g} Hz: a blow of {self.duration:g} s has no force at "
+                f"1.5/duration; allowed: up to {SEEN / self.duration:g} Hz, or a shorter blow",
                 *("highest", "duration"),
             )
         if high > self.highest:
@@ -103,7 +106,8 @@ class Recorded(ForceOnMass):
 
     kind: Literal["recorded"] = entry("a force from a file", "recorded")
     file: Annotated[str, File((".csv",))] = entry(
-        "columns time and force, with a unit in brackets or in s and N; linear between rows",
+        "file with columns time and force, with a unit in brackets or in s and N; linear "
+        "between rows",
         "force.csv",
     )
 
@@ -115,7 +119,7 @@ class Recorded(ForceOnMass):
             raise disagreement(str(error), "file") from error
         if len(times) < 2 or not (times[1:] > times[:-1]).all():
             raise disagreement(
-                "times that do not ascend; allowed: two or more, each after the last", "file"
+                "times that do not ascend; allowed: two or more ascending times", "file"
             )
         return self
 

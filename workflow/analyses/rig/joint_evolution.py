@@ -32,23 +32,23 @@ class Logarithmic(Section):
     """Factor 1 + change ln(1 + rate E)."""
 
     kind: Literal["logarithmic"] = entry("1 + change ln(1 + rate E)", "logarithmic")
-    change: Change = entry("of the factor with the logarithm [1]", 0.26)
-    rate: PerEnergy = entry("beside the energy [1/(N*mm)]", "1.3e9 1/J")
+    change: Change = entry("change of the factor with the logarithm [1]", 0.26)
+    rate: PerEnergy = entry("rate, multiplied by the energy [1/(N*mm)]", "1.3e9 1/J")
 
 
 class Arrhenius(Section):
     """Factor 1 + change exp(-scale / E)."""
 
     kind: Literal["arrhenius"] = entry("1 + change exp(-scale / E)", "arrhenius")
-    change: Change = entry("of the factor in the end [1]", 1.32)
-    scale: PositiveEnergy = entry("energy that it takes [N*mm]", "150 J")
+    change: Change = entry("change of the factor in the end [1]", 1.32)
+    scale: PositiveEnergy = entry("energy scale [N*mm]", "150 J")
 
 
 class Linear(Section):
     """Factor 1 + slope E, at least 0."""
 
     kind: Literal["linear"] = entry("1 + slope E", "linear")
-    slope: Slope = entry("against energy [1/(N*mm)]", "0.24 1/kJ")
+    slope: Slope = entry("rate against energy [1/(N*mm)]", "0.24 1/kJ")
 
 
 class Exponential(Section):
@@ -58,10 +58,12 @@ class Exponential(Section):
         "final + (1 - final) (share exp(-rate E) + (1 - share) exp(-second_rate E))",
         "exponential",
     )
-    final: Final = entry("in the end [1]", 0.72)
-    rate: PerEnergy = entry("of the first exponential [1/(N*mm)]", "0.3 1/kJ")
-    share: Part = entry("of the first exponential [1]", 0.8, default=1.0)
-    second_rate: PerEnergy = entry("of the second exponential [1/(N*mm)]", "5 1/kJ", default=0.0)
+    final: Final = entry("factor in the end [1]", 0.72)
+    rate: PerEnergy = entry("rate of the first exponential [1/(N*mm)]", "0.3 1/kJ")
+    share: Part = entry("share of the first exponential [1]", 0.8, default=1.0)
+    second_rate: PerEnergy = entry(
+        "rate of the second exponential [1/(N*mm)]", "5 1/kJ", default=0.0
+    )
 
 
 class FactorTable(Table):
@@ -69,7 +71,7 @@ class FactorTable(Table):
 
     kind: Literal["table"] = entry("factors against energies", "table")
     energy: tuple[TotalEnergy, ...] = entry(
-        "dissipated so far in the joint, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,)
+        "energy dissipated so far in the joint, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,)
     )
 
 
@@ -80,20 +82,24 @@ Factor = Annotated[
 
 def _unfit(worn: WearCase) -> str:
     """Return why a wear case cannot describe a joint, or an empty text if it can."""
-    return "" if worn.loops.wanted else "leaves no table of loops; give loops.amplitude or force"
+    return (
+        ""
+        if worn.loops.wanted
+        else "writes no table of loops; allowed: a case with loops.amplitude or force"
+    )
 
 
 class EvolutionSection(Section):
     """Factors of the joint's parameters against the energy E that it has dissipated so far."""
 
-    friction: Factor | None = entry("of joint.friction", default=None)
-    stiffness: Factor | None = entry("of joint.stiffness", default=None)
-    residual_stiffness: Factor | None = entry("of joint.residual_stiffness", default=None)
-    normal_load: Factor | None = entry("of joint.normal_load", default=None)
+    friction: Factor | None = entry("evolution of joint.friction", default=None)
+    stiffness: Factor | None = entry("evolution of joint.stiffness", default=None)
+    residual_stiffness: Factor | None = entry("evolution of joint.residual_stiffness", default=None)
+    normal_load: Factor | None = entry("evolution of joint.normal_load", default=None)
     file: Annotated[str, CaseFile((".csv", YAML), WEAR_CASES, "wear with loops", _unfit)] | None = (
         entry(
-            "instead of friction and stiffness: loops_<interface>.csv of a wear run, or measured: "
-            "its kt (all of the stuck slope, joint.residual_stiffness included) and mu against "
+            "instead of friction and stiffness: loops_<interface>.csv of a wear run or measured "
+            "kt (the whole stuck slope, joint.residual_stiffness included) and mu against "
             "energy; or the wear case itself, which is run first",
             "loops.csv",
             default=None,
@@ -104,7 +110,7 @@ class EvolutionSection(Section):
     def _file_stands_alone(self) -> EvolutionSection:
         for key in ("friction", "stiffness"):
             if self.file is not None and getattr(self, key) is not None:
-                raise disagreement(f"given beside {key}; allowed: one of them", "file", key)
+                raise disagreement(f"given with {key}; allowed: one of them", "file", key)
         return self
 
     @model_validator(mode="after")

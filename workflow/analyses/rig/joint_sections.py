@@ -25,9 +25,9 @@ class Joint(Section):
     """A joint with a friction limit, elastic as long as it sticks: entries of all friction laws."""
 
     law: str  # named first; each law narrows it to its own name
-    normal_load: Preload = entry("that presses the joint [N]", "60 N")
+    normal_load: Preload = entry("normal load that presses the joint [N]", "60 N")
     friction: Coefficient = entry("limit of the friction force over the normal load [1]", 0.11)
-    stiffness: JointStiffness = entry("of the stuck joint [N/mm]", "27.3 N/um")
+    stiffness: JointStiffness = entry("stiffness of the stuck joint [N/mm]", "27.3 N/um")
 
     @property
     def moves_mean(self) -> bool:
@@ -39,7 +39,7 @@ class RisingJoint(Joint):
     """A joint whose force continues to rise when all of it slides."""
 
     residual_stiffness: ResidualStiffness = entry(
-        "slope when all of it slides [N/mm]", "0.88 N/um", default=0.0
+        "slope when all of the joint slides [N/mm]", "0.88 N/um", default=0.0
     )
 
 
@@ -47,18 +47,18 @@ class BoucWenJoint(RisingJoint):
     """Bouc and Wen's law, normalised: force µN ξ, plus the residual slope."""
 
     law: Literal["bouc_wen"] = entry(
-        "bouc_wen, jenkins, uniform_iwan or four_parameter_iwan; in a reduced structure "
-        "friction_contact too, in a friction_rig only that",
+        "bouc_wen, jenkins, uniform_iwan or four_parameter_iwan; in a reduced structure also "
+        "friction_contact, in a friction_rig only that",
         "bouc_wen",
     )
     stiffness: JointStiffness = entry(
-        "initial slope, the residual one included [N/mm]", "27.3 N/um"
+        "initial slope, residual stiffness included [N/mm]", "27.3 N/um"
     )
     sigma: Annotated[float, Quantity("1", at_least=0.5, at_most=1.0)] = entry(
         "shape of the unloading branch: straight at first with 0.5 [1]", 0.5, default=0.5
     )
     exponent: Annotated[float, Quantity("1", at_least=1.0, at_most=100.0)] = entry(
-        "how sharply sticking turns into sliding [1]", 2, default=2.0
+        "sharpness of the transition from sticking to sliding [1]", 2, default=2.0
     )
 
     @model_validator(mode="after")
@@ -76,7 +76,7 @@ class JenkinsJoint(RisingJoint):
 
     law: Literal["jenkins"] = entry("a spring with a slider", "jenkins")
     stiffness: JointStiffness = entry(
-        "of the spring; the residual one is added [N/mm]", "27.3 N/um"
+        "stiffness of the spring; the residual one is added [N/mm]", "27.3 N/um"
     )
 
 
@@ -84,7 +84,7 @@ class IwanJoint(RisingJoint):
     """Iwan's sliders in parallel."""
 
     stiffness: JointStiffness = entry(
-        "of all sliders stuck; the residual one is added [N/mm]", "115 N/um"
+        "stiffness with all sliders stuck; the residual one is added [N/mm]", "115 N/um"
     )
 
 
@@ -99,10 +99,11 @@ class FourParameterIwanJoint(IwanJoint):
 
     law: Literal["four_parameter_iwan"] = entry("Segalman 2005", "four_parameter_iwan")
     chi: Annotated[float, Quantity("1", above=-1.0, at_most=10.0)] = entry(
-        "energy of a small cycle goes with the amplitude to the power of chi + 3 [1]", -0.5
+        "the energy of a small cycle is proportional to the amplitude to the power of chi + 3 [1]",
+        -0.5,
     )
     beta: Annotated[float, Quantity("1", at_least=0.0, at_most=1e3)] = entry(
-        "stiffness lost at once in full slip over that of the spread sliders [1]", 1.0
+        "stiffness lost at once in full slip, relative to that of the spread sliders [1]", 1.0
     )
 
 
@@ -110,11 +111,11 @@ class FrictionContactJoint(Joint):
     """Contact at points of a reduced structure: Coulomb's cone about the normal, on springs."""
 
     law: Literal["friction_contact"] = entry(
-        "a point of a contact, in a reduced structure or a friction_rig", "friction_contact"
+        "a contact point, in a reduced structure or a friction_rig", "friction_contact"
     )
-    stiffness: JointStiffness = entry("along the surface, stuck [N/mm]", "100 N/um")
-    normal_stiffness: JointStiffness = entry("in contact [N/mm]", "100 N/um")
-    gap: Gap = entry("instead of a normal load: open by so much at rest [mm]", "0 um", default=0.0)
+    stiffness: JointStiffness = entry("stiffness along the surface, stuck [N/mm]", "100 N/um")
+    normal_stiffness: JointStiffness = entry("normal stiffness in contact [N/mm]", "100 N/um")
+    gap: Gap = entry("gap at rest, instead of a normal load [mm]", "0 um", default=0.0)
 
     @property
     def moves_mean(self) -> bool:
@@ -124,7 +125,7 @@ class FrictionContactJoint(Joint):
     def _pressed_or_open(self) -> FrictionContactJoint:
         if self.gap > 0.0 and self.normal_load > 0.0:
             raise disagreement(
-                f"{self.gap:g} mm: given beside a normal load; allowed: one of them above 0",
+                f"{self.gap:g} mm: given with a normal load; allowed: one of them above 0",
                 *("gap", "normal_load"),
             )
         return self
@@ -151,19 +152,19 @@ class PolynomialSpringJoint(ElasticJoint):
 
     law: Literal["polynomial_spring"] = entry("a nonlinear spring", "polynomial_spring")
     stiffness: Annotated[float, Quantity("N/mm", at_least=-1e12, at_most=1e12)] = entry(
-        "of small motions: may be 0 or below [N/mm]", "1 N/um"
+        "stiffness of small motions, which may be 0 or negative [N/mm]", "1 N/um"
     )
     quadratic: Annotated[float, Quantity("N/mm^2", at_least=-1e15, at_most=1e15)] = entry(
-        "force over displacement squared [N/mm^2]", "0 N/mm^2", default=0.0
+        "force over the square of the displacement [N/mm^2]", "0 N/mm^2", default=0.0
     )
     cubic: Annotated[float, Quantity("N/mm^3", at_least=-1e18, at_most=1e18)] = entry(
-        "force over its third power: above 0 hardens [N/mm^3]", "1e5 N/mm^3", default=0.0
+        "force over the third power; above 0 it hardens [N/mm^3]", "1e5 N/mm^3", default=0.0
     )
     quartic: Annotated[float, Quantity("N/mm^4", at_least=-1e21, at_most=1e21)] = entry(
-        "force over its fourth power [N/mm^4]", "0 N/mm^4", default=0.0
+        "force over the fourth power [N/mm^4]", "0 N/mm^4", default=0.0
     )
     quintic: Annotated[float, Quantity("N/mm^5", at_least=-1e24, at_most=1e24)] = entry(
-        "force over its fifth power [N/mm^5]", "0 N/mm^5", default=0.0
+        "force over the fifth power [N/mm^5]", "0 N/mm^5", default=0.0
     )
 
     @property
@@ -175,9 +176,9 @@ class ElasticStopJoint(ElasticJoint):
     """A spring that takes load once a gap is closed."""
 
     law: Literal["elastic_stop"] = entry("a spring behind a gap", "elastic_stop")
-    stiffness: JointStiffness = entry("once the gap is closed [N/mm]", "10 N/um")
-    gap: Gap = entry("until it is met [mm]", "20 um", default=0.0)
-    two_sided: StrictBool = entry("whether there is one on either side", False, default=False)
+    stiffness: JointStiffness = entry("stiffness once the gap is closed [N/mm]", "10 N/um")
+    gap: Gap = entry("gap up to the stop [mm]", "20 um", default=0.0)
+    two_sided: StrictBool = entry("whether there is a stop on either side", False, default=False)
 
     @property
     def moves_mean(self) -> bool:

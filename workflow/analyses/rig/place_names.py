@@ -52,7 +52,9 @@ class PlaceNames:
             )
         for point, opposite in zip(points, opposites, strict=True):
             if point == opposite:
-                raise EntryError(f"{key}.against", f"{point} against itself; allowed: others")
+                raise EntryError(
+                    f"{key}.against", f"{point} joined to itself; allowed: other points"
+                )
         return list(zip(points, opposites, strict=True))
 
     def links(self, connection: Against, key: str) -> list[Link]:

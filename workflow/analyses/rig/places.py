@@ -15,7 +15,7 @@ Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
 class KeptPoints(Section):
     """Kept points of a reduced body."""
 
-    points: Title = entry("one, such as pad 17, or all of a kind, such as pad", "pad")
+    points: Title = entry("one point, such as pad 17, or all of a kind, such as pad", "pad")
 
 
 class Moved(KeptPoints):
@@ -28,8 +28,8 @@ class Against(Moved):
     """A connection of kept points with others or with the ground."""
 
     against: Title | None = entry(
-        "other points, as many, or one for all; of a ring's sector also those of the next, as next "
-        "tip; without it the ground",
+        "other points, as many, or one for all; of a ring's sector also those of the next, as "
+        "next tip; without it the ground",
         "ring 1",
         default=None,
     )

@@ -44,13 +44,13 @@ class JointPlaces(Against):
     """A joint at each of some points."""
 
     direction: Direction = entry(
-        "in which the points move when the joint stretches; those of a friction contact move so to "
-        "close it, and slide across",
+        "direction in which the points move as the joint stretches; a friction contact closes "
+        "along it and slides across it",
         "-z",
     )
     joint: VibrationLaw | None = entry(
-        "law and parameters of these joints together; without it those of the case's joint, which "
-        "all entries without one share",
+        "law and parameters of these joints together; without it those of the case's joint, "
+        "which all entries without a law share",
         default=None,
     )
 
@@ -58,11 +58,14 @@ class JointPlaces(Against):
 class RowJoint(JointPlaces):
     """A joint of a mass in a row."""
 
-    points: Title = entry("the mass: m1, m2, ... from the ground on", "m2")
+    points: Title = entry("the mass: m1, m2, ... counted from the ground", "m2")
     against: Title | None = entry("another mass; without it the ground", "m1", default=None)
-    direction: Direction = entry("x, or -x: in which the mass stretches it", "x", default="x")
+    direction: Direction = entry(
+        "x or -x: direction in which the mass stretches the joint", "x", default="x"
+    )
     joint: RowLaw | None = entry(
-        "law and parameters of its own; without it the case's joint, which all without one share",
+        "law and parameters of this joint; without it the case's joint, which all joints "
+        "without a law share",
         default=None,
     )
 
@@ -71,19 +74,19 @@ class RowOfMasses(Section):
     """Masses in a row on springs, counted from the ground, of which the last one has the joint."""
 
     refused: ClassVar[Mapping[str, str]] = {
-        "joints": "given; allowed: leave them out: the contact that wears alone is the joint"
+        "joints": "given; allowed: leave them out: the contact that wears is the only joint"
     }
 
     kind: Literal["rig"] = entry("masses in a row", "rig")
     masses: Annotated[tuple[Mass, ...], Field(min_length=1, max_length=20)] = entry(
-        "from the ground on [t]", ["21.2 kg", "1.2 kg"]
+        "masses, from the ground on [t]", ["21.2 kg", "1.2 kg"]
     )
     springs: Annotated[tuple[Spring, ...], Field(min_length=1, max_length=20)] = entry(
-        "each between its mass and the one before, or the ground [N/mm]",
+        "springs, each between its mass and the one before, or the ground [N/mm]",
         ["1.4 N/um", "273 N/um"],
     )
     damping_ratio: DampingRatios = entry(f"without the joint, {OF_MODES}", 0.001)
-    damping: Damping | None = entry("added to that of the modes", default=None)
+    damping: Damping | None = entry("damping added to that of the modes", default=None)
 
     @model_validator(mode="after")
     def _damps_its_own(self) -> RowOfMasses:
@@ -116,8 +119,8 @@ class Rig(RowOfMasses):
     refused: ClassVar[Mapping[str, str]] = {}
 
     joints: tuple[RowJoint, ...] = entry(
-        "where they are; the case's joint is between the last mass and the ground where no entry "
-        "takes it",
+        "places of the joints; the case's joint is between the last mass and the ground if no "
+        "entry uses it",
         default=(),
     )
 
@@ -134,7 +137,7 @@ class Rig(RowOfMasses):
                     )
             if joint.points == joint.against:
                 raise disagreement(
-                    f"{joint.points} against itself; allowed: others", f"{key}.against"
+                    f"{joint.points} joined to itself; allowed: other masses", f"{key}.against"
                 )
             if joint.direction[-1] != "x":
                 raise disagreement(
@@ -152,28 +155,30 @@ class Rig(RowOfMasses):
 class AddedMass(KeptPoints):
     """A mass that points share evenly."""
 
-    mass: Mass = entry("of all of them together [t]", "1.2 kg")
+    mass: Mass = entry("mass of all of them together [t]", "1.2 kg")
 
 
 class AddedSpring(Against):
     """A spring that points share evenly."""
 
-    stiffness: Spring = entry("of all of them together [N/mm]", "273 N/um")
+    stiffness: Spring = entry("stiffness of all of them together [N/mm]", "273 N/um")
 
 
 class FurtherMass(Section):
     """A mass at a point of its own that is not part of the body."""
 
-    name: Title = entry("of the point, as joints, springs and forces name it", "damper")
+    name: Title = entry("name of the point in joints, springs and forces", "damper")
     mass: Mass = entry("[t]", "50 g")
     directions: Literal["xyz", "xy", "xz", "yz", "x", "y", "z"] = entry(
-        "in which it moves; it is held in the others", "xz", default="xyz"
+        "directions in which it moves; it is held in the others", "xz", default="xyz"
     )
 
     @model_validator(mode="after")
     def _is_a_point(self) -> FurtherMass:
         if re.fullmatch(MODE, self.name) is not None:
-            raise disagreement(f"{shown(self.name)}: the name of a mode; allowed: others", "name")
+            raise disagreement(
+                f"{shown(self.name)}: the name of a mode; allowed: other names", "name"
+            )
         return self
 
 
@@ -187,7 +192,7 @@ class StoredBody(Section):
         "specimens.yaml",
     )
     body: Annotated[int, Whole(1, 2)] | None = entry(
-        "of a specimens case: 1 below its pad, or 2 above", 2, default=None
+        "body of a specimens case: 1 below its pad, or 2 above", 2, default=None
     )
 
 
@@ -196,20 +201,21 @@ class JointedBody(Section, ABC):
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("driven", "body")
 
-    joints: tuple[JointPlaces, ...] = entry("where they are", min_length=1)
-    masses: tuple[AddedMass, ...] = entry("added, moving in x, y and z", default=())
+    joints: tuple[JointPlaces, ...] = entry("places of the joints", min_length=1)
+    masses: tuple[AddedMass, ...] = entry("added masses, moving in x, y and z", default=())
     further_masses: tuple[FurtherMass, ...] = entry(
-        "beside the body, such as a damper: joints and springs hold them", default=()
+        "points with mass outside the body, such as a damper, held by joints and springs",
+        default=(),
     )
     springs: tuple[AddedSpring, ...] = entry("added", default=())
     damping_ratio: DampingRatios = entry(f"without the joints, {OF_MODES}", 0.001)
-    damping: Damping | None = entry("added to that of the modes", default=None)
+    damping: Damping | None = entry("damping added to that of the modes", default=None)
     driven: Moved | None = entry(
         "points that share the force of the excitation evenly; none where the excitation of a "
         "steady vibration names its own",
         default=None,
     )
-    seen: Moved = entry("points whose mean displacement is looked at")
+    seen: Moved = entry("points whose mean displacement is reported")
 
     @model_validator(mode="after")
     def _names_masses_once(self) -> JointedBody:
@@ -217,7 +223,8 @@ class JointedBody(Section, ABC):
         for number, name in enumerate(names):
             if name in names[:number]:
                 raise disagreement(
-                    f"{shown(name)}: twice; allowed: each its own", f"further_masses.{number}.name"
+                    f"{shown(name)}: given twice; allowed: different names",
+                    f"further_masses.{number}.name",
                 )
         return self
 
@@ -255,7 +262,7 @@ class ReducedBody(JointedBody, StoredBody):
     def _body_of_a_case(self) -> ReducedBody:
         of_a_case = self.file.endswith(YAML)
         if of_a_case != (self.body is not None):
-            wrong = "missing" if of_a_case else f"{self.body}: given beside a single body"
+            wrong = "missing" if of_a_case else f"{self.body}: given with a file of a single body"
             raise disagreement(f"{wrong}; allowed: with a case of specimens, 1 or 2", "body")
         return self
 
@@ -289,20 +296,22 @@ class FrictionRig(Section):
         "specimens_rig.yaml",
     )
     masses: tuple[Mass, Mass] = entry(
-        "that which is driven, and that which holds the upper specimen [t]",
+        "driven mass, and mass that holds the upper specimen [t]",
         ["21.152 kg", "1.189 kg"],
     )
     springs: tuple[Spring, Spring] = entry(
-        "from the ground to the first mass, and on to the second [N/mm]",
+        "springs from the ground to the first mass, and on to the second [N/mm]",
         ["1.3469e3 N/mm", "273e3 N/mm"],
     )
     damping_ratio: DampingRatios = entry(f"with the contact open, {OF_MODES}", 0.001)
-    damping: Damping | None = entry("added to that of the modes", default=None)
+    damping: Damping | None = entry("damping added to that of the modes", default=None)
     target_distance: Length = entry(
-        "from the contact plane to where a laser looks at each specimen [mm]", "1 mm", default=1.0
+        "distance of a laser's targets from the contact plane on each specimen [mm]",
+        "1 mm",
+        default=1.0,
     )
     sharing: Literal["even", "area"] = entry(
-        "of the joint's stiffness among the pairs of nodes: even, or by the area of each",
+        "sharing of the joint's stiffness among the pairs of nodes: even, or by the area of each",
         "area",
         default="area",
     )
@@ -409,7 +418,7 @@ def refuse_missing_mass(structure: Section, mass: int | None, key: str, otherwis
     if mass is None:
         return
     if not isinstance(structure, RowOfMasses):
-        raise disagreement(f"{mass}: given beside {otherwise}", key)
+        raise disagreement(f"{mass}: given with {otherwise}", key)
     count = len(structure.masses)
     if mass > count:
         raise disagreement(f"{mass}: no such mass; allowed: 1 to {count}", key)

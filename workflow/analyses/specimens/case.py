@@ -53,28 +53,29 @@ Depth = Annotated[float, Quantity("mm", at_least=0.0, at_most=1e4)]
 class Form(Section):
     """Radii of each strip, which is flat without them."""
 
-    along: RoundingRadius = entry("of its section along the strip [mm]", "1000 mm")
-    across: RoundingRadius = entry("of its section across the strip [mm]", "50 mm")
+    along: RoundingRadius = entry("radius of the section along the strip [mm]", "1000 mm")
+    across: RoundingRadius = entry("radius of the section across the strip [mm]", "50 mm")
 
 
 class Specimens(Section):
     """Two cylinders end to end, each narrowed to a strip; the strips cross over a square pad."""
 
-    kind: Literal["specimens"] = entry("what the structure is", "specimens")
-    diameter: Length = entry("of the cylinders [mm]", "8 mm")
-    length: Length = entry("of each cylinder [mm]", "33 mm")
-    strip_width: Length = entry("of each strip, the side of the pad [mm]", "1 mm")
-    chamfer_depth: Depth = entry("from the strip down to the cylinder's side [mm]", "1 mm")
+    kind: Literal["specimens"] = entry("kind of structure", "specimens")
+    diameter: Length = entry("diameter of the cylinders [mm]", "8 mm")
+    length: Length = entry("length of each cylinder [mm]", "33 mm")
+    strip_width: Length = entry("width of each strip, the side of the pad [mm]", "1 mm")
+    chamfer_depth: Depth = entry("depth from the strip down to the cylinder's side [mm]", "1 mm")
     ring_distance: Length = entry(
-        "from the pad to the ring where the holder ends, which is held or moved [mm]", "2 mm"
+        "distance from the pad to the ring where the holder ends, which is held or moved [mm]",
+        "2 mm",
     )
     ring_nodes: Annotated[int, Whole(4, 400)] = entry(
-        "points of the ring that are kept, a multiple of 4", 16, default=16
+        "number of points of the ring that are kept, a multiple of 4", 16, default=16
     )
-    form: Form | None = entry("of the strips; without it they are flat", default=None)
+    form: Form | None = entry("form of the strips; without it they are flat", default=None)
     surfaces: MeasuredSurfaces | None = entry(
-        "of the pads as measured, on top of the form: rows along x, which is along body 1's strip, "
-        "about the middle of the pad; with angle: 90 deg along body 2's",
+        "measured surfaces of the pads, added to the form: rows along x, which is along body 1's "
+        "strip, about the middle of the pad; with angle: 90 deg along body 2's",
         default=None,
     )
 
@@ -112,9 +113,9 @@ class FrettingLoads(Section):
     }
 
     normal_forces: Annotated[tuple[PressingForce, ...], Field(min_length=1)] = entry(
-        "constant while the pair is fretted [N]", ["17 N", "87 N", "150 N", "250 N"]
+        "normal force, constant while the pair is fretted [N]", ["17 N", "87 N", "150 N", "250 N"]
     )
-    stroke: Length = entry("of body 2's ring along x, peak to peak [mm]", "14 um")
+    stroke: Length = entry("stroke of body 2's ring along x, peak to peak [mm]", "14 um")
 
     @model_validator(mode="after")
     def _forces_differ(self) -> FrettingLoads:
@@ -132,8 +133,8 @@ class SpecimenMesh(Section):
     pad_elements: Annotated[int, Whole(2, 60)] = entry(
         "squares along each side of the pad, an even number", 10, default=10
     )
-    size: Length = entry("of the largest elements [mm]", "1 mm", default=1.0)
-    order: Literal[1, 2] = entry("of the tetrahedra, 1 or 2", 2, default=2)
+    size: Length = entry("size of the largest elements [mm]", "1 mm", default=1.0)
+    order: Literal[1, 2] = entry("order of the tetrahedra, 1 or 2", 2, default=2)
 
     @model_validator(mode="after")
     def _pad_has_a_middle(self) -> SpecimenMesh:
@@ -146,30 +147,32 @@ class Reduction(Section):
     """Craig-Bampton model of each specimen on the nodes of its pad and ring."""
 
     modes: Annotated[int, Whole(1, 500)] = entry(
-        "fixed-interface modes that are kept", 20, default=20
+        "number of fixed-interface modes that are kept", 20, default=20
     )
 
 
 class PadGrid(Section):
     """Half-space over exactly the pad, for the same contact."""
 
-    grid: tuple[GridCells, GridCells] = entry("cells along x, y", [40, 40], default=(40, 40))
+    grid: tuple[GridCells, GridCells] = entry(
+        "number of cells along x, y", [40, 40], default=(40, 40)
+    )
     link: Literal["corrected", "half_space"] = entry(
-        "corrected: the specimens deform as they do; half_space: as half-spaces",
+        "corrected: the specimens deform as their models do; half_space: as half-spaces",
         "corrected",
         default="corrected",
     )
     tolerance: Tolerance = entry(
-        "relative, on equilibrium and complementarity [1]", 1e-8, default=1e-8
+        "relative tolerance of equilibrium and complementarity [1]", 1e-8, default=1e-8
     )
 
 
 class ExplicitStep(Section):
     """A block of cycles of constant geometry."""
 
-    fraction: Ratio = entry("of the stability limit [1]", 0.5, default=0.5)
+    fraction: Ratio = entry("share of the stability limit [1]", 0.5, default=0.5)
     cycles: Cycles | None = entry(
-        "of every step instead, refused where it would be unstable [1]", 1000, default=None
+        "cycles of every step instead; refused where they would be unstable [1]", 1000, default=None
     )
 
 
@@ -177,8 +180,10 @@ class Reported(Section):
     """A reported number of cycles, from which the wear coefficient that gives it is found."""
 
     normal_force: PressingForce = entry("one of load_path.normal_forces [N]", "17 N")
-    steady: Literal["stiffness", "pressure"] = entry("what no longer changes then", "stiffness")
-    cycles: Cycles = entry("when it has become steady [1]", 2.5e6)
+    steady: Literal["stiffness", "pressure"] = entry(
+        "quantity that no longer changes then", "stiffness"
+    )
+    cycles: Cycles = entry("cycles after which it is steady [1]", 2.5e6)
 
 
 class SpecimensWear(TwoBodies[BodyWear], Laws):
@@ -186,12 +191,12 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
 
     in_schema: ClassVar[Mapping[str, Any]] = one_of("cycles", "energy")
 
-    cycles: Cycles | None = entry("under each normal force [1]", 3e5, default=None)
+    cycles: Cycles | None = entry("cycles under each normal force [1]", 3e5, default=None)
     energy: PositiveEnergy | None = entry(
-        "instead of cycles: dissipated under each normal force [N*mm]", "1 kJ", default=None
+        "energy dissipated under each normal force, instead of cycles [N*mm]", "1 kJ", default=None
     )
     step: ExplicitStep = entry("cycles of constant geometry", default=ExplicitStep())
-    reported: tuple[Reported, ...] = entry("cycles that a source reports", default=())
+    reported: tuple[Reported, ...] = entry("number of cycles that a source reports", default=())
 
     @model_validator(mode="after")
     def _ends_once(self) -> SpecimensWear:
@@ -203,7 +208,7 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
     @model_validator(mode="after")
     def _something_wears(self) -> SpecimensWear:
         if self.body_1.rate(1.0) == self.body_2.rate(1.0) == 0.0:
-            raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
+            raise disagreement("0 for both bodies; allowed: for one of them at most", "body_1")
         return self
 
     @model_validator(mode="after")
@@ -213,7 +218,7 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
             if self.reported and (isinstance(body, WornByArchard) or body.evolution is not None):
                 raise disagreement(
                     "given for a body that wears by archard, or whose coefficient changes; "
-                    "allowed: with laws of energy alone, without evolution",
+                    "allowed: only with energy laws without evolution",
                     "reported",
                 )
         return self
@@ -223,8 +228,8 @@ class SpecimensOutput(Output):
     """Files that are written in addition to summary, results and reduced bodies."""
 
     matrices: Annotated[bool | tuple[str, ...], Formats(MATRIX_FORMATS)] = entry(
-        "of the reduced bodies, for other programs: false, true (npz), or one or a list of npz, "
-        "mat and mtx; body_1.h5 and body_2.h5 are always there",
+        "files of the reduced bodies for other programs: false, true (npz), or one or a list of "
+        "npz, mat and mtx; body_1.h5 and body_2.h5 are always written",
         ["npz", "mat"],
         default=False,
     )
@@ -243,16 +248,18 @@ class SpecimensCase(WithScans, Case):
     about: ClassVar[str] = "two crossed specimens of a friction rig that wear each other"
 
     title: Title = entry("one line", "Friction-rig specimens worn at 14 um stroke")
-    analysis: Literal["wear"] = entry("what is computed", "wear")
-    structure: Specimens = entry("two specimens alike, turned 90° to each other")
+    analysis: Literal["wear"] = entry("kind of analysis", "wear")
+    structure: Specimens = entry("two equal specimens, turned 90° to each other")
     materials: TwoMaterials = entry("the two specimens")
     friction: Friction = entry("Coulomb's law on the pad")
-    load_path: FrettingLoads = entry("what every cycle does")
+    load_path: FrettingLoads = entry("load of every cycle")
     mesh: SpecimenMesh = entry("finite elements of each specimen", default=SpecimenMesh())
-    reduction: Reduction = entry("of each specimen", default=Reduction())
-    contact: PadGrid = entry("half-space beside the specimens", default=PadGrid())
+    reduction: Reduction = entry("reduction of each specimen", default=Reduction())
+    contact: PadGrid = entry("half-space for comparison with the specimens", default=PadGrid())
     wear: SpecimensWear = entry("law, length of the run and of its cycle blocks")
-    output: SpecimensOutput = entry("files beside summary and results", default=SpecimensOutput())
+    output: SpecimensOutput = entry(
+        "files written with summary and results", default=SpecimensOutput()
+    )
 
     @property
     def elastic(self) -> tuple[ElasticMaterial, ElasticMaterial]:
@@ -306,7 +313,7 @@ class SpecimensCase(WithScans, Case):
             ("load path", f"{forces} N{' in turn' * several}, stroke {stroke}"),
             *of_bodies("material", self.materials),
             ("friction", f"{self.friction.coefficient:g}"),
-            ("contact", f"reduced specimens; beside them {cells} cells on a half-space"),
+            ("contact", f"reduced specimens; for comparison {cells} cells on a half-space"),
             *wearing({"body_1": wear.body_1, "body_2": wear.body_2}),
             ("wear", f"{end}{' each' * several}, in cycle blocks of {block}"),
         ]
@@ -315,8 +322,8 @@ class SpecimensCase(WithScans, Case):
         side = self.structure.strip_width
         if self.load_path.stroke > side:
             yield (
-                f"load_path.stroke: {plain(self.load_path.stroke, 'mm')}, longer than the pad, "
-                f"{plain(side, 'mm')}: is its unit right?"
+                f"load_path.stroke: {plain(self.load_path.stroke, 'mm')}, longer than the pad "
+                f"({plain(side, 'mm')}): is its unit right?"
             )
         bodies = self.materials.body_1, self.materials.body_2
         for index, force in enumerate(self.load_path.normal_forces):

@@ -233,5 +233,5 @@ def bulk_compliance(pair: ReducedPair, half_space: PadHalfSpace) -> BulkComplian
 
 def _converged(state: State) -> State:
     if not state.converged:
-        raise MethodFailed(f"the half-space beside the specimens: {state.message}")
+        raise MethodFailed(f"the half-space for comparison: {state.message}")
     return state

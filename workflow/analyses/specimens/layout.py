@@ -29,7 +29,7 @@ LAYOUT = Layout(
         f"grid/{PAD}": GRID,
         f"specimens/{PAD}": {
             **face_mesh(),
-            **over("node", area=("mm^2", "of contact that belongs to each node")),
+            **over("node", area=("mm^2", "of contact area that belongs to each node")),
         },
         "specimens/<body>": over(
             "mode",

@@ -34,6 +34,7 @@ from workflow.analyses.specimens.outcome import (
 )
 from workflow.analyses.specimens.results import write_specimens_output
 from workflow.analyses.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.analysis import Run
 from workflow.shell.few_cells import check_cells
@@ -47,7 +48,7 @@ KEPT_STATES = 13
 CURVE_POINTS, CURVE_POWER = 61, 2.0
 HALF_SPACE_POINTS = 13
 # End of the message on measured surfaces finer than the nodes of the pad.
-FINER = "these wear, and only the half-space beside them has all that its grid carries"
+FINER = "these wear, and only the half-space for comparison resolves what its grid does"
 # Increments of the coupled cycle in a quarter of it: with 16, the energy of Masing's loop has an
 # error of 2e-3.
 QUARTER = 16
@@ -147,9 +148,10 @@ def _fret(
     for state in (first, last):
         if state.misfit is not None and state.misfit > LARGEST_RESIDUAL:
             reporter.warn(
-                f"{name}: the link to the specimens leaves {state.misfit:.1%} of what half-spaces "
-                "deform, and its pressures may be wrong by as much: raise mesh.pad_elements; at "
-                "the sharp border of flat pads that are not worn no mesh is fine enough"
+                f"{name}: the link to the specimens has an error of {percent(state.misfit)} of the "
+                "deformation of half-spaces, and its pressures may be wrong by as much: raise "
+                "mesh.pad_elements (no mesh is fine enough for the sharp border of unworn flat "
+                "pads)"
             )
     check_cells(name, case.contact, grid, first.pressure, reporter)
     check_cells(name, case.contact, grid, last.pressure, reporter, worn=True)
@@ -229,19 +231,19 @@ def _check(state: BlockState, conditions: FrettingConditions, case: SpecimensCas
         )
     if case.wear.energy is not None and contact.energy == 0.0:
         raise UserError(
-            f"wear.energy: nothing slides at {force}, so that it is never dissipated; raise "
+            f"wear.energy: nothing slides at {force}, so this energy is never dissipated: raise "
             "load_path.stroke or friction.coefficient, or give wear.cycles"
         )
     if state.wear.any() and np.isinf(state.stable_cycles):
         raise UserError(
-            f"mesh.pad_elements: a single node of the pad touches at {force}, too few to wear; "
+            f"mesh.pad_elements: only one node of the pad touches at {force}, too few to wear: "
             "raise it, or load_path.normal_forces"
         )
     # Number of blocks of the run if all are as long as the first one.
     needed = state.number or _to_go(case, state) / _block(case, state)
     if needed > MOST_BLOCKS:
         raise UserError(
-            f"wear: more than {MOST_BLOCKS} cycle blocks at {force}; lower the wear coefficients, "
+            f"wear: more than {MOST_BLOCKS} cycle blocks at {force}: lower the wear coefficients, "
             "the cycles or the energy, or lengthen wear.step"
         )
 

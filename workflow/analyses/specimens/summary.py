@@ -37,21 +37,25 @@ def explanation(outcome: SpecimensOutcome) -> list[str]:
     ring = outcome.model.case.structure.ring_distance
     unworn, beside = first.kept[0].block.contact.normal, first.half_space[0]
     shares = [edge_share(outcome.model.pair, p) for p in (unworn.pressure, beside.nodal_pressure)]
-    softer = ": they lack what a half-space has beside the strips" if bulk.tangential > 0.0 else ""
-    held = f": held {ring:g} mm from the pad, where a half-space gives way"
+    softer = (
+        ": they lack the material that a half-space has around the strips"
+        if bulk.tangential > 0.0
+        else ""
+    )
+    held = f": held {ring:g} mm from the pad, where a half-space yields"
     stiffer = held if bulk.normal < 0.0 else ""
     sentences = [
-        f"tied along x the pad of the specimens has {1e-3 * stiff_x:.4g} N/um and a half-space "
-        f"{1e-3 * half_x:.4g}, so that the specimens' compliance differs by "
-        f"{1e6 * bulk.tangential:.3g} nm/N{softer}",
-        f"tied along z they have {1e-3 * stiff_z:.4g} and {1e-3 * half_z:.4g} N/um, a difference "
-        f"of {1e6 * bulk.normal:.3g} nm/N{stiffer}",
-        f"at {first.force:g} N unworn {unworn.area:.3g} mm^2 touch on the specimens, in whole "
+        f"with the pad tied along x, the specimens have {0.001 * stiff_x:.4g} N/um and a "
+        f"half-space {0.001 * half_x:.4g}, so that the specimens' compliance differs by "
+        f"{1000000.0 * bulk.tangential:.3g} nm/N{softer}",
+        f"with the pad tied along z, they have {0.001 * stiff_z:.4g} and {0.001 * half_z:.4g} "
+        f"N/um, a difference of {1000000.0 * bulk.normal:.3g} nm/N{stiffer}",
+        f"at {first.force:g} N, unworn, {unworn.area:.3g} mm^2 touch on the specimens, in whole "
         f"nodes, and {beside.area:.3g} mm^2 on the half-space, in whole cells",
     ]
     if max(shares) > 0.0:
         sentences.append(
-            f"there the border of the pad bears {shares[0]:.3g} times the mean pressure on the "
+            f"there the border of the pad carries {shares[0]:.3g} times the mean pressure on the "
             f"specimens and {shares[1]:.3g} times on the half-space"
         )
     return sentences

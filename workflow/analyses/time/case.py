@@ -60,7 +60,7 @@ JumpError = Annotated[float, Quantity("1", at_least=1e-10, at_most=0.1)]
 class SingleJoint(Section):
     """A structure that is only the joint."""
 
-    kind: Literal["joint"] = entry("what the structure is", "joint")
+    kind: Literal["joint"] = entry("kind of structure", "joint")
 
 
 class Ageing(Section):
@@ -69,10 +69,12 @@ class Ageing(Section):
     in_schema: ClassVar[Mapping[str, Any]] = one_of("energy", "cycles")
 
     energy: PositiveEnergy | None = entry(
-        "instead of cycles: dissipated until the end [N*mm]", "2800 J", default=None
+        "energy dissipated until the end, instead of cycles [N*mm]", "2800 J", default=None
     )
-    cycles: Cycles | None = entry("until the end [1]", 1.08e6, default=None)
-    tolerance: JumpError = entry("of the cycles, for the jumps in energy [1]", 1e-4, default=1e-4)
+    cycles: Cycles | None = entry("number of cycles until the end [1]", 1.08e6, default=None)
+    tolerance: JumpError = entry(
+        "relative error of the cycles that jumps in energy may cause [1]", 1e-4, default=1e-4
+    )
 
     @model_validator(mode="after")
     def _one_end(self) -> Ageing:
@@ -96,10 +98,10 @@ class SteadyAgeing(Ageing):
 class Integration(Section):
     """Newmark's method, implicit in the force of the joint."""
 
-    step: Time = entry("of time [s]", "10 us", default=1e-5)
+    step: Time = entry("time step [s]", "10 us", default=1e-5)
     tolerance: StepError | None = entry(
-        "error of the displacement that a step may add before it is taken in parts, relative to "
-        "the largest displacement; without it none is [1]",
+        "error of the displacement that a step may add before it is split, relative to the "
+        "largest displacement; without it steps are never split [1]",
         1e-5,
         default=None,
     )
@@ -108,34 +110,35 @@ class Integration(Section):
 class ReportedValue(Section):
     """A value that a source reports, shown next to the computed one without any requirement."""
 
-    quantity: DottedPath = entry("path into summary.json", "states.-1.friction")
+    quantity: DottedPath = entry("path in summary.json", "states.-1.friction")
     value: Annotated[float, Quantity(None)] = entry(
-        "with its unit; a bare number is in base units", 0.9
+        "value with its unit; a bare number is in base units", 0.9
     )
-    source: Title = entry("where the value comes from", "measured")
+    source: Title = entry("source of the value", "measured")
 
 
 class TimeCase(Case):
     """A joint that changes with the energy it dissipates."""
 
     title: Title = entry("one line", "Bouc-Wen joint at a prescribed stroke")
-    analysis: Literal["time"] = entry("what is computed", "time")
-    structure: Section = entry("what holds the joint")
-    joint: Joint = entry("its law, and the parameters that it begins with")
+    analysis: Literal["time"] = entry("kind of analysis", "time")
+    structure: Section = entry("structure that holds the joint")
+    joint: Joint = entry("law of the joint, and its initial parameters")
     evolution: EvolutionSection = entry(
-        "of the parameters with dissipated energy; without it none", default=EvolutionSection()
+        "evolution of the parameters with dissipated energy; without it none",
+        default=EvolutionSection(),
     )
     energies: tuple[TotalEnergy, ...] = entry(
-        "dissipated so far, ascending, at which the joint is looked at [N*mm]",
+        "energies dissipated so far, ascending, at which the joint is reported [N*mm]",
         ["0 J", "1 kJ"],
         default=(0.0,),
         min_length=1,
     )
     output: OutputWithoutFields = entry(
-        "files beside summary and results", default=OutputWithoutFields()
+        "files written with summary and results", default=OutputWithoutFields()
     )
     reported: tuple[ReportedValue, ...] = entry(
-        "values to be told beside those computed", default=()
+        "reported values to show with the computed ones", default=()
     )
 
     @model_validator(mode="after")
@@ -151,19 +154,19 @@ class TimeCase(Case):
     @model_validator(mode="after")
     def _energies_ascend(self) -> TimeCase:
         if any(after <= before for before, after in pairwise(self.energies)):
-            raise disagreement("not ascending; allowed: each energy above the last", "energies")
+            raise disagreement("not ascending; allowed: ascending energies", "energies")
         return self
 
 
 class JointCase(TimeCase):
     """A joint alone, moved forward and backward until it is worn."""
 
-    about: ClassVar[str] = "a friction joint alone, driven to and fro until it is worn"
+    about: ClassVar[str] = "a friction joint alone, driven forward and backward until it is worn"
 
-    structure: SingleJoint = entry("what holds the joint: nothing but its drive")
-    joint: JointLaw = entry("its law, and the parameters that it begins with")
-    drive: PrescribedMotion = entry("motion that is imposed on the joint")
-    ageing: Ageing = entry("how long it is driven")
+    structure: SingleJoint = entry("structure of the joint: nothing but its drive")
+    joint: JointLaw = entry("law of the joint, and its initial parameters")
+    drive: PrescribedMotion = entry("imposed motion of the joint")
+    ageing: Ageing = entry("duration of the test")
 
     @model_validator(mode="after")
     def _ends_after_them(self) -> JointCase:
@@ -189,19 +192,18 @@ class RigCase(TimeCase):
 
     title: Title = entry("one line", "Friction rig driven by a force")
     structure: Annotated[Rig | ReducedBody | MatrixBody, Field(discriminator="kind")] = entry(
-        "what holds the joint"
+        "structure that holds the joint"
     )
     joint: ContactLaw = entry(
-        "its law, and the parameters that it begins with; several joints share them evenly, but "
-        "those with a law of their own in structure.joints, which stays as it is"
+        "law of the joint, and its initial parameters; several joints share them evenly, except "
+        "those with a law of their own in structure.joints, which does not evolve"
     )
-    excitation: Excitation = entry("what drives the rig")
+    excitation: Excitation = entry("excitation of the rig")
     ageing: SteadyAgeing = entry(
-        "for a harmonic force: how long the joint is worn in steady states; without an end not "
-        "at all",
+        "for a harmonic force: duration of wear in steady states; without an end there is no wear",
         default=SteadyAgeing(),
     )
-    integration: Integration = entry("of the motion in time", default=Integration())
+    integration: Integration = entry("integration in time", default=Integration())
 
     @model_validator(mode="after")
     def _drives_a_mass(self) -> RigCase:
@@ -214,8 +216,8 @@ class RigCase(TimeCase):
     def _leaves_a_joint(self) -> RigCase:
         if None not in own_laws(self.structure):
             raise disagreement(
-                f"{self.joint.law}: given, but every entry of joints has a law of its own; "
-                "allowed: an entry without one, whose joint this is",
+                f"{self.joint.law}: not used, because every entry of joints has a law of its own; "
+                "allowed: an entry without one, which takes this joint",
                 *("joint", "structure.joints"),
             )
         return self
@@ -225,8 +227,8 @@ class RigCase(TimeCase):
         damping = self.structure.damping
         if damping is not None and damping.loss_factor > 0.0:
             raise disagreement(
-                f"{damping.loss_factor:g}: in steady vibration only; allowed: 0, and half of it as "
-                "structure.damping_ratio, which is the same at resonance",
+                f"{damping.loss_factor:g}: only in steady vibration; allowed: 0, and half of it "
+                "as structure.damping_ratio, which is the same at resonance",
                 "structure.damping.loss_factor",
             )
         return self
@@ -235,8 +237,8 @@ class RigCase(TimeCase):
     def _has_the_directions(self) -> RigCase:
         if isinstance(self.joint, FrictionContactJoint) and isinstance(self.structure, Rig):
             raise disagreement(
-                "friction_contact: has three directions; allowed: in a reduced structure, or "
-                "jenkins, which it is along one",
+                "friction_contact has three directions; allowed: in a reduced structure, or "
+                "jenkins, which has one",
                 "joint.law",
             )
         return self
@@ -256,7 +258,7 @@ class RigCase(TimeCase):
             return self
         if not isinstance(self.excitation, Harmonic):
             raise disagreement(
-                f"given beside {self.excitation.kind}; allowed: with a harmonic force", "ageing"
+                f"given with {self.excitation.kind}; allowed: with a harmonic force", "ageing"
             )
         check_within(self.energies, self.ageing)
         return self
@@ -348,7 +350,7 @@ def joint_outline(
     if not case.evolution.is_empty:
         rows.append(("evolution", case.evolution.text))
     if any(case.energies):
-        rows.append(("looked at", f"after {', '.join(map(joules, case.energies))} dissipated"))
+        rows.append(("states", f"after {', '.join(map(joules, case.energies))} dissipated"))
     return rows
 
 

@@ -100,7 +100,7 @@ def loops(file: h5py.File, contents: MotionContents) -> Figure:
         displacement, force = TO_MICRONS * loop["displacement"][()], loop["force"][()]
         axis.plot(displacement, force, color=colour, label=label)
     axis.set(xlabel="displacement of the joint [µm]", ylabel="force of the joint [N]")
-    axis.set_title(f"{LAW_NAMES[file.attrs['law']]}: settled cycles after so much energy")
+    axis.set_title(f"{LAW_NAMES[file.attrs['law']]}: steady cycles after so much energy")
     legend_below(figure, [axis], columns=3, title="dissipated so far")
     return figure
 
@@ -141,7 +141,7 @@ def _draw_parameter(axis: Axes, file: h5py.File, name: str) -> None:
     states = list(file["states"].values())
     energies = [TO_JOULES * float(state.attrs["energy"]) for state in states]
     values = [factor * float(state.attrs[name]) for state in states]
-    axis.plot(energies, values, "o", color=BLACK, mfc="none", label="looked at")
+    axis.plot(energies, values, "o", color=BLACK, mfc="none", label="reported states")
     axis.set(xlabel="energy dissipated so far [J]", ylabel=label)
     axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
 
@@ -190,7 +190,7 @@ def frequency_response(file: h5py.File, contents: MotionContents) -> Figure:
     top.set_ylim(0.5 * min(map(np.min, inside)), 2.0 * max(map(np.max, inside)))
     highest = max(float(response["frequency"][-1]) for _, _, response in shown)
     top.set_title("first mode")
-    bottom.set(title="all that was recorded", xlabel="frequency [Hz]", xlim=(0.0, highest))
+    bottom.set(title="whole record", xlabel="frequency [Hz]", xlim=(0.0, highest))
     for axis in (top, bottom):
         axis.set_ylabel("acceleration / force [m/s²/N]")
     legend_below(figure, [top], title="dissipated so far")

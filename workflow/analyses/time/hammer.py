@@ -28,6 +28,7 @@ from workflow.analyses.time.motion import (
     warn_of_steps,
 )
 from workflow.analyses.time.outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 from workflow.layout.declared import Arrays
 from workflow.models.rig.rig_model import RigModel
@@ -48,8 +49,8 @@ DECAYED = 0.9
 RING_DOWN_POINTS = 400
 # Reason why a ring-down has no damping, and the result to use instead.
 TOO_SHORT = (
-    "the motion has faded before the filter that follows its first mode has settled, so neither "
-    "damping nor frequency over the amplitude is told; the frequency response is"
+    "the motion fades before the filter around its first mode settles, so damping and frequency "
+    "against amplitude are not known; the frequency response is"
 )
 
 
@@ -91,8 +92,8 @@ def _state(
     response = frequency_response(blow.value(motion.times), acceleration, step)
     if response.remaining > AT_REST:
         reporter.warn(
-            f"at {joules(energy)} {response.remaining:.0%} of the response is left when the record "
-            "ends, which blurs its peaks: raise excitation.record"
+            f"at {joules(energy)} the record ends with {percent(response.remaining)} of the "
+            "response left, which blurs its peaks: raise excitation.record"
         )
     peaks = _peak("first", response, *hammer.band, energy)
     if rig.in_a_row and len(bounds["stuck"]) > 1:

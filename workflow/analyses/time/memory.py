@@ -18,7 +18,7 @@ def memory(case: JointCase | RigCase, displacements: int = 0) -> Memory:
 
     ``displacements`` is their number in a reduced body, once it is known.
     """
-    remedy = "raise integration.step, or shorten what is recorded"
+    remedy = "raise integration.step, or shorten the record"
     if isinstance(case, JointCase):
         return Memory(0.0, remedy)
     if isinstance(case.structure, Rig):

@@ -13,6 +13,7 @@ from fe_models.dynamics.transient.newmark import TimeStepControl
 from sa_solver.steps import COMPUTED, Steps
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 from workflow.layout.declared import Arrays
 from workflow.models.rig.motion import LARGEST_ERROR, MotionModel, curves_of
@@ -52,7 +53,7 @@ def warn_of_steps(energy: float, error: float, reporter: Reporter) -> None:
     """Warn where the time steps cause a large error of a motion at an ``energy`` [N mm]."""
     if error > LARGEST_ERROR:
         reporter.warn(
-            f"at {joules(energy)} the steps of time leave an error of {error:.1%} of the largest "
+            f"at {joules(energy)} the time steps cause an error of {percent(error)} of the largest "
             "displacement: lower integration.step"
         )
 

@@ -41,8 +41,8 @@ LAYOUT = Layout(
             **over("time", time=("s", "time"), excitation=("N", "force of the excitation")),
             **over(
                 "time seen",
-                displacement=("mm", "displacements of what is seen"),
-                acceleration=("mm/s^2", "accelerations of what is seen"),
+                displacement=("mm", "displacements of the reported points"),
+                acceleration=("mm/s^2", "accelerations of the reported points"),
             ),
             **over(
                 "time", joint_force=("N", "force of the joint, or the sum of several, resisting")
@@ -60,12 +60,12 @@ LAYOUT = Layout(
         f"states/<state>/{RESPONSE}": over(
             "frequency",
             frequency=("Hz", "frequency"),
-            magnitude=("mm/(s^2 N)", "acceleration of what is looked at, over the excitation"),
-            phase=("rad", "of the acceleration before the excitation"),
+            magnitude=("mm/(s^2 N)", "acceleration of the reported point over the excitation"),
+            phase=("rad", "phase of the acceleration to the excitation"),
         ),
         f"states/<state>/{RING_DOWN}": over(
             "amplitude",
-            amplitude=("mm", "amplitude of what is looked at, in its first mode"),
+            amplitude=("mm", "amplitude of the reported point, in its first mode"),
             frequency=("Hz", "instantaneous frequency"),
             damping_ratio=("1", "instantaneous damping ratio"),
         ),

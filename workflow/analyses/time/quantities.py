@@ -12,7 +12,7 @@ from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, told
 
-AGEING, IN_TIME = "jumps in energy, a bound", "displacement, by the steps in time"
+AGEING, IN_TIME = "jumps in energy, a bound", "displacement, due to the time steps"
 STEADY = "intervals between steady states"
 STIFFNESSES = "stiffness", "residual_stiffness"
 # Quantities of a state in addition to the joint's parameters: unit, text, everyday unit.
@@ -20,7 +20,7 @@ NUMBERS = {
     "cycles": ("1", "cycles so far", ""),
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
     "stroke": ("mm", "stroke of the joint, peak to peak", ""),
-    "largest_displacement": ("mm", "largest displacement of what is looked at", ""),
+    "largest_displacement": ("mm", "largest displacement of the reported point", ""),
     "dissipated": ("N mm", "energy dissipated in the motion", ""),
     "first_frequency": ("Hz", "first peak of the response", ""),
     "first_peak": ("mm/s^2/N", "height of the first peak", "m/s^2/N"),

@@ -250,8 +250,8 @@ class _SteadyStates:
         last = self.steps.march("period", _Settling(start, np.full(2, np.inf)), further)
         if last.steady is None:
             raise MethodFailed(
-                f"no steady state at {joules(energy)} after {excitation.periods} cycles: they "
-                f"still change by {last.change:.1e}; raise excitation.periods or excitation.steady"
+                f"no steady state at {joules(energy)} after {excitation.periods} cycles, which "
+                f"still change by {last.change:.1e}: raise excitation.periods or excitation.steady"
             )
         return last.steady
 
@@ -295,7 +295,7 @@ def _aged(
         nodes = sorted({*nodes, *inner, max(last, nodes[-1])})
     if error > ageing.tolerance:
         reporter.warn(
-            f"ageing: {len(nodes)} steady states leave an error of about {error:.1e}, above "
+            f"ageing: {len(nodes)} steady states cause an error of about {error:.1e}, above "
             f"ageing.tolerance {ageing.tolerance:g}"
         )
     numbers = {"relative_error": error, "steady_states": len(nodes)}

@@ -29,11 +29,11 @@ def with_computed_wear(run: Run[JointCase | RigCase]) -> JointCase | RigCase:
     case, file = run.case, run.case.evolution.file
     if file is None or not file.endswith(YAML):
         return case
-    folder = run.folder.reserve(WEAR, "the wear of the contact, a run of its own")
+    folder = run.folder.reserve(WEAR, "wear of the contact, a run of its own")
     with run.reporter.stage("wear of the contact"):
         computed = run.compute(Path(file), folder)
     if not computed:
-        run.reporter.say(f"wear of the contact: as an earlier run has left it in {folder}")
+        run.reporter.say(f"wear of the contact: taken from the earlier run in {folder}")
     summary = OutputFolder(folder).read_summary()
     tables = {
         name: folder / told["loops"]["file"]
@@ -66,12 +66,12 @@ def warn_of_table(case: JointCase | RigCase, last: float, reporter: Reporter) ->
     if table.sliding.min() < SLIDES:
         reporter.warn(
             f"evolution.file: {np.count_nonzero(table.sliding < SLIDES)} of its {len(table.mu)} "
-            "loops do not slide as a whole, and their mu is less than the coefficient of friction: "
-            "run them with a larger loops.amplitude"
+            "loops do not slide as a whole, so their mu is less than the coefficient of "
+            "friction: compute them with a larger loops.amplitude"
         )
     load = case.joint.normal_load
     if load > 0.0 and np.any(np.abs(table.P - load) > SAME_LOAD * load):
         reporter.warn(
-            f"evolution.file: its loops are under {table.P.min():g} to {table.P.max():g} N, the "
-            f"joint is under {load:g} N: stiffness depends on the load"
+            f"evolution.file: its loops are under {table.P.min():g} to {table.P.max():g} N, but "
+            f"the joint is under {load:g} N, and stiffness depends on the load"
         )

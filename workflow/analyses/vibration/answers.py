@@ -94,7 +94,7 @@ def _message(branch: ResponseBranch, frequency: float, found: tuple[HarmonicSolu
     if found:
         return ""
     low, high = branch.frequencies.min(), branch.frequencies.max()
-    return f"none: the curve, from {low:.6g} to {high:.6g} Hz, ends before"
+    return f"none: the curve from {low:.6g} to {high:.6g} Hz does not reach it"
 
 
 def _numbers(

@@ -55,7 +55,9 @@ def further_from(
         steps=steps,
     )
     if not found:
-        reporter.warn(f"{name}: no further branch is found; known ones pass by, or nothing does")
+        reporter.warn(
+            f"{name}: no further branch found: the search ended on known ones, or nowhere"
+        )
     return [(branch, _curves(case, model, branch, name, reporter, steps)) for branch in found]
 
 

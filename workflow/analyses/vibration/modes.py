@@ -56,8 +56,8 @@ def mode_of(
     if moved <= STILL * np.abs(linear.shape).max():
         raise MethodFailed(
             f"modes: mode {number}, at {linear.frequency:.4g} Hz, does not move "
-            f"{model.rig.labels[-1]}, whose amplitude counts; look at another place, or leave the "
-            "mode out"
+            f"{model.rig.labels[-1]}, by which amplitudes are measured: report another point, or "
+            "leave the mode out"
         )
     # Convert observed amplitudes to modal ones, by the shape of the linear mode.
     least, largest = (amplitude / moved for amplitude in case.modes.amplitudes)

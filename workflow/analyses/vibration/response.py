@@ -31,6 +31,7 @@ from workflow.analyses.vibration.output.harmonics import harmonics_of
 from workflow.analyses.vibration.output.loops import loops_of
 from workflow.analyses.vibration.output.outcome import DIAMETERS, RESONANCE, Curves, Response
 from workflow.analyses.vibration.stability import stability_along
+from workflow.case.text.plain import shares
 from workflow.errors import MethodFailed
 from workflow.layout.declared import Arrays
 from workflow.models.vibration.motions import (
@@ -47,7 +48,7 @@ LARGEST_ERROR = 0.05
 # weighs as much as this known share of the curve in predictions.
 POINTS, BEGUN = 50, 0.2
 # Reason why a curve may end at a resonance.
-UNBOUNDED = "; without damping what the joints do not hold back has no bound at resonance"
+UNBOUNDED = "; without damping, resonances at which the joints do not resist are unbounded"
 
 
 def progress_along(
@@ -303,6 +304,6 @@ def warn_of_stroke(
     )
     if stroke > LARGE_STROKE * width:
         reporter.warn(
-            f"{told} the pads slide over each other by {stroke:.3g} mm, "
-            f"more than {LARGE_STROKE:.0%} of their width: that other nodes meet is neglected"
+            f"{told} the pads slide over each other by {stroke:.3g} mm, more than "
+            f"{shares(LARGE_STROKE)} of their width: the result neglects that other nodes then meet"
         )

@@ -33,6 +33,7 @@ from workflow.analyses.vibration.output.outcome import (
 from workflow.analyses.vibration.output.results import write_vibration_output
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.stability import looked_for
+from workflow.case.text.readable import percent
 from workflow.errors import UserError
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.analysis import Run
@@ -124,14 +125,16 @@ def _tell_what_is_left_out(
 ) -> None:
     """Report the parts of records that are left out, and stability that is not computed."""
     for number, share in enumerate(model.driving.left_out):
-        reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic left out")
+        reporter.log(
+            f"record {number + 1}: {percent(share)} above its highest harmonic is not used"
+        )
         if share > LEFT_OUT:
             reporter.warn(
-                f"excitation.records.{number}: {share:.1%} of its force is above the highest "
-                "harmonic taken and left out: raise highest, or resolution.harmonics"
+                f"excitation.records.{number}: {percent(share)} of its force is above the highest "
+                "harmonic used and is lost: raise highest, or resolution.harmonics"
             )
     if case.stability == "auto" and not looked_for(case, model):
-        reporter.say("stability: not looked for in so large a structure; `stability: every` does")
+        reporter.say("stability: not computed in so large a structure; `stability: every` does it")
 
 
 @dataclass

@@ -84,7 +84,7 @@ def stability_along(
     _warn_of_folds(name, bifurcations, reporter)
     unknown = [at for at in known if at.verdict == "unknown"]
     if len(unknown) == len(known) and known:
-        reporter.warn(f"{name}: nothing is said of stability: {unknown[0].message}")
+        reporter.warn(f"{name}: stability is not known: {unknown[0].message}")
     numbers: dict[str, Any] = {
         "unstable_points": sum(at.verdict == "unstable" for at in known),
         "unknown_points": len(unknown),
@@ -108,8 +108,8 @@ def _warn_of_folds(
         multiplier = each["multiplier"] * np.exp(1j * each["multiplier_angle"])
         if abs(multiplier - 1.0) > AWAY:
             reporter.warn(
-                f"{name}: the fold at {each['frequency']:.4g} Hz is none of the motion itself, of "
-                f"which no multiplier is near 1 there ({multiplier:.2g}): give more "
+                f"{name}: the fold at {each['frequency']:.4g} Hz is not one of the motion itself, "
+                f"as no multiplier is near 1 there ({multiplier:.2g}): give more "
                 "resolution.harmonics and resolution.samples"
             )
 

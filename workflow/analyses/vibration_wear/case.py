@@ -55,15 +55,15 @@ def _unfit(bodies: BodiesWearCase) -> str:
         return "a cycle of legs or a file; take load_path: {P, stroke}, of which P counts"
     if bodies.material(1) != bodies.material(2):
         return (
-            "materials that are not alike, whose pressure follows the shear; take the same "
-            "material twice"
+            "dissimilar materials, whose pressure depends on the shear; take the same material "
+            "twice"
         )
     if bodies.friction.at(0.0) == 0.0:
         return "no friction.coefficient above 0"
     if not bodies.wear.step.automatic:
         return (
-            "wear.step of a given size; take implicit or second_order steps, whose length follows "
-            "from wear.tolerance"
+            "wear.step of a given size; take implicit or second_order steps, whose length "
+            "follows from wear.tolerance"
         )
     return ""
 
@@ -74,8 +74,8 @@ class WornContact(Section):
     file: Annotated[
         str, CaseFile((YAML,), (BodiesWearCase,), "wear of two bodies over an area", _unfit)
     ] = entry(
-        "a wear case of two bodies: form, materials, friction, normal force, grid and wear are "
-        "taken from it; its stroke, cycles and stop are not",
+        "a wear case of two bodies, for form, materials, friction, normal force, grid and wear; "
+        "its stroke, cycles and stop are not used",
         "specimens_wear.yaml",
     )
 
@@ -86,19 +86,18 @@ class WearByVibration(Section):
     also_filled_in: ClassVar[tuple[str, ...]] = ("force",)
 
     force: DrivingForce | None = entry("amplitude [N]", "40 N", default=None)
-    level: Level | None = entry(
-        "instead of force: by which the excitation is multiplied [1]", 1, default=None
-    )
-    frequency: Frequency = entry("of the force [Hz]", "100 Hz")
+    level: Level | None = entry("factor of the excitation, instead of force [1]", 1, default=None)
+    frequency: Frequency = entry("frequency of the force [Hz]", "100 Hz")
     cycles: Annotated[tuple[Cycles, ...], Field(min_length=1, max_length=100)] = entry(
-        "so many in all, ascending; before the first of them the contact is unworn [1]",
+        "numbers of cycles at which states are reported, ascending; the contact is first "
+        "reported unworn [1]",
         [1000, 100_000],
     )
 
     @model_validator(mode="after")
     def _ascending(self) -> WearByVibration:
         if any(after <= before for before, after in pairwise(self.cycles)):
-            raise disagreement("not ascending; allowed: each number above the last", "cycles")
+            raise disagreement("not ascending; allowed: ascending numbers", "cycles")
         return self
 
     @property
@@ -114,19 +113,20 @@ class WearOfNodes(WearByVibration):
     in_schema: ClassVar[Mapping[str, Any]] = one_of("frequency", "at_resonance")
 
     frequency: Frequency | None = entry(  # type: ignore[assignment]
-        "of the force [Hz]", "100 Hz", default=None
+        "frequency of the force [Hz]", "100 Hz", default=None
     )
     at_resonance: StrictBool = entry(
-        "without frequency: whether it is that at which what is driven lags the force by a quarter "
-        "of a period, found anew as wear moves it; at first the largest within frequencies",
+        "instead of frequency: whether to follow phase resonance, at which the driven point lags "
+        "the force by a quarter of a period, as wear moves it; at first the largest within "
+        "frequencies",
         False,
         default=False,
     )
     tolerance: Annotated[
         float, Quantity("1", at_least=1e-4, at_most=0.5, range_text="0.01 % to 50 %")
     ] = entry(
-        "error of a first-order step over what it wears; the step taken, of second order, is far "
-        "better [1]",
+        "error of a first-order step relative to what it wears; the second-order step that is "
+        "taken is far better [1]",
         0.1,
         default=0.1,
     )
@@ -134,7 +134,7 @@ class WearOfNodes(WearByVibration):
     @model_validator(mode="after")
     def _at_one_frequency(self) -> WearOfNodes:
         if (self.frequency is None) != self.at_resonance:
-            wrong = "given beside at_resonance" if self.at_resonance else "missing"
+            wrong = "given with at_resonance" if self.at_resonance else "missing"
             raise disagreement(
                 f"{wrong}; allowed: frequency, or at_resonance: true", "frequency", "at_resonance"
             )
@@ -148,13 +148,13 @@ class WearOfNodes(WearByVibration):
 class WearOfBody(TwoBodies[BodyWear], Laws, WearOfNodes):
     """Wear of contacts at nodes of a reduced body, with the wear laws of both bodies."""
 
-    body_1: BodyWear = entry("what the points of the joints meet: others, or the ground")
+    body_1: BodyWear = entry("body at the other side of the joints, or the ground")
     body_2: BodyWear = entry("the body at the points of the joints")
 
     @model_validator(mode="after")
     def _something_wears(self) -> WearOfBody:
         if self.body_1.rate(1.0) == self.body_2.rate(1.0) == 0.0:
-            raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
+            raise disagreement("0 for both bodies; allowed: for one of them at most", "body_1")
         return self
 
 
@@ -163,14 +163,14 @@ class VibrationWearCaseBase(VibrationCaseBase):
 
     title: Title = entry("one line", "Forced response of a friction rig as it wears")
     structure: RowOfMasses | FrictionRig | ReducedBody | MatrixBody = entry(
-        "what holds the contact"
+        "structure that holds the contact"
     )
     excitation: VibrationExcitation | None = entry(
-        "instead of forces and mass, with wear.level: forces at any places, records, motion of the "
-        "ground",
+        "instead of forces and mass, with wear.level: forces at any places, records, motion of "
+        "the ground",
         default=None,
     )
-    wear: WearByVibration = entry("how the contact wears")
+    wear: WearByVibration = entry("wear of the contact")
 
     @classmethod
     def suits(cls, source: Source) -> bool:
@@ -227,8 +227,8 @@ class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
 
     about: ClassVar[str] = "the steady vibration of a rig on a ball or flat that it wears"
 
-    structure: RowOfMasses = entry("what holds the contact")
-    contact: WornContact = entry("between the last mass and the ground")
+    structure: RowOfMasses = entry("structure that holds the contact")
+    contact: WornContact = entry("contact between the last mass and the ground")
 
     @model_validator(mode="after")
     def _has_its_places(self) -> VibrationWearCase:
@@ -248,7 +248,7 @@ class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
         pressed = f"pressed by {plain(bodies.load_path.P, 'N')}"
         return [
             *super().outline(),
-            ("contact", f"that of {Path(self.contact.file).name}, {pressed}"),
+            ("contact", f"from {Path(self.contact.file).name}, {pressed}"),
             ("grid", f"{' x '.join(map(str, bodies.contact.grid))} cells"),
             *outline_of(self.contact.file, BodiesWearCase, OF_CONTACT),
         ]
@@ -258,7 +258,7 @@ class NodesWearCase(VibrationWearCaseBase):
     """Steady vibration of a structure that wears its contacts node by node."""
 
     joint: PadContacts = entry("all contacts together")
-    wear: WearOfNodes = entry("how the contacts wear")
+    wear: WearOfNodes = entry("wear of the contacts")
 
     @model_validator(mode="after")
     def _has_a_resonance(self) -> NodesWearCase:
@@ -266,7 +266,7 @@ class NodesWearCase(VibrationWearCaseBase):
         if self.wear.at_resonance and excitation is not None and excitation.moves_by_a_way:
             raise disagreement(
                 "true: with a displacement of the ground, whose forces change with the "
-                "frequency; allowed: a kind of base that is acceleration, or wear.frequency",
+                "frequency; allowed: base.kind: acceleration, or wear.frequency",
                 *("wear.at_resonance", "excitation"),
             )
         return self
@@ -307,9 +307,9 @@ class FrictionRigWearCase(NodesWearCase):
 
     about: ClassVar[str] = "the steady vibration of a rig with two specimens that it wears"
 
-    structure: FrictionRig = entry("two specimens in a rig; their case says how they wear")
-    joint: PadContacts = entry("all contacts of the pads together; gaps are those of their form")
-    wear: WearOfNodes = entry("how the pads wear")
+    structure: FrictionRig = entry("two specimens in a rig; their case states how they wear")
+    joint: PadContacts = entry("all contacts of the pads together; gaps follow from their form")
+    wear: WearOfNodes = entry("wear of the pads")
 
 
 class ReducedWearCase(NodesWearCase):
@@ -327,7 +327,7 @@ class ReducedWearCase(NodesWearCase):
         default=None,
     )
     joint: NodeContacts = entry("all contacts together")
-    wear: WearOfBody = entry("how the contacts wear")
+    wear: WearOfBody = entry("wear of the contacts")
 
     def _check_contacts(self, rig: RigModel) -> None:
         if self.joint.pressed is not None:

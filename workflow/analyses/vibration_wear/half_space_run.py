@@ -40,7 +40,7 @@ from workflow.analyses.vibration_wear.vibrating_contact import ContactCycle, Vib
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
 from workflow.analyses.wear.translation import wear_of
 from workflow.case.loading import load_case
-from workflow.case.text.plain import counted
+from workflow.case.text.plain import counted, shares
 from workflow.layout.declared import Arrays
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.few_cells import check_cells
@@ -153,8 +153,8 @@ class _Description:
         width = float(np.count_nonzero(pressed)) * self.contact.grid.pitch[0]
         if cycle.stroke > LARGE_STROKE * width:
             self.reporter.warn(
-                f"the stroke is more than {LARGE_STROKE:.0%} of the contact's width: that the "
-                "surfaces move over each other is neglected"
+                f"the stroke exceeds {shares(LARGE_STROKE)} of the contact's width: the result "
+                "neglects that the surfaces move over each other"
             )
 
 

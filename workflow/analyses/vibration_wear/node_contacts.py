@@ -29,11 +29,11 @@ AREA, GAP = "area", "gap"
 class PadContacts(Joint):
     """A friction contact at every node of two pads that a load presses together."""
 
-    law: Literal["friction_contact"] = entry("at every node of the pads", "friction_contact")
+    law: Literal["friction_contact"] = entry("law at every node of the pads", "friction_contact")
     friction: WearingFriction = entry("limit of the friction force over the normal load [1]", 0.88)
-    normal_load: PressingForce = entry("that presses the pads together [N]", "60 N")
-    stiffness: JointStiffness = entry("along the pads, stuck [N/mm]", "45 N/um")
-    normal_stiffness: JointStiffness = entry("in contact [N/mm]", "58.5 N/um")
+    normal_load: PressingForce = entry("normal load that presses the pads together [N]", "60 N")
+    stiffness: JointStiffness = entry("stiffness along the pads, stuck [N/mm]", "45 N/um")
+    normal_stiffness: JointStiffness = entry("normal stiffness in contact [N/mm]", "58.5 N/um")
 
 
 @dataclass(frozen=True)
@@ -87,24 +87,24 @@ class NodeContacts(PadContacts):
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("area",)
 
-    law: Literal["friction_contact"] = entry("of every joint", "friction_contact")
-    normal_load: PressingForce = entry("that presses all contacts together [N]", "60 N")
+    law: Literal["friction_contact"] = entry("law of every joint", "friction_contact")
+    normal_load: PressingForce = entry("normal load that presses all contacts together [N]", "60 N")
     pressed: Moved | None = entry(
-        "points on which the normal load acts, evenly, and which way; without it every contact "
-        "carries its share of the load before it wears, whatever the structure",
+        "points on which the normal load acts, evenly, and its direction; without it every "
+        "contact carries its share of the load before it wears, whatever the structure",
         default=None,
     )
     area: Annotated[float, Area] | None = entry(
-        "of all contacts together, each having the same [mm^2]", "1 mm^2", default=None
+        "area of all contacts together, each having the same [mm^2]", "1 mm^2", default=None
     )
     nodes: Annotated[str, File((".csv",))] | None = entry(
-        "instead of area: of each contact; columns point, such as pad 17, area [mm^2], and with "
-        "pressed the gap before wear [mm]",
+        "file of each contact, instead of area; columns point, such as pad 17, area [mm^2], and "
+        "with pressed the gap before wear [mm]",
         "nodes.csv",
         default=None,
     )
     sharing: Literal["even", "area"] = entry(
-        "of stiffness and load among the contacts: even, or by the area of each",
+        "sharing of stiffness and load among the contacts: even, or by the area of each",
         "area",
         default="area",
     )
@@ -123,14 +123,14 @@ class NodeContacts(PadContacts):
             raise disagreement(f"missing; allowed: {wanted}", "area")
         if self.area is not None and by_node is not None:
             raise disagreement(
-                f"{self.area:g} mm^2: given beside areas in {shown(self.nodes)}; allowed: one of "
+                f"{self.area:g} mm^2: given with areas in {shown(self.nodes)}; allowed: one of "
                 "them",
                 *("area", "nodes"),
             )
         if self.pressed is None and table is not None and table.gap is not None:
             raise disagreement(
-                f"gaps in {shown(self.nodes)} without pressed, so that each contact carries a "
-                "load; allowed: with pressed, points on which the normal load acts",
+                f"gaps in {shown(self.nodes)}, but without pressed every contact carries a load; "
+                "allowed: with pressed, points on which the normal load acts",
                 *("nodes", "pressed"),
             )
         return self

@@ -65,9 +65,10 @@ def wear_nodes(
         worn = _worn_state(case.unworn, pads.at(state), state, reached, reporter, steps)
         if worn.numbers["step_error"] > wear.tolerance:
             reporter.warn(
-                f"{cycles:g} cycles: wear steps leave an error of {worn.numbers['step_error']:.2g} "
-                f"of depth or volume, above wear.tolerance {wear.tolerance:g}: lower it, or raise "
-                "resolution.samples or resolution.harmonics"
+                f"{cycles:g} cycles: wear steps cause an error of "
+                f"{worn.numbers['step_error']:.2g} of depth or volume, above wear.tolerance "
+                f"{wear.tolerance:g}: lower it, or raise resolution.samples or "
+                "resolution.harmonics"
             )
         return worn
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from workflow.case.text.readable import percent
 from workflow.shell.terminal.reporter import Reporter
 
 # Relative tolerance on an error that equals its allowed part except for rounding.
@@ -82,12 +83,14 @@ def report_choice(
     if record is None:
         return
     estimated, seconds = record["estimated_error"], record["seconds"]
-    error = f"chosen: estimated error {estimated:.2%} of {record['accuracy']:.2%} required"
+    error = (
+        f"chosen: estimated error {percent(estimated)} of {percent(record['accuracy'])} required"
+    )
     if not again:
         for decision in record["decisions"]:
             reporter.say(f"chosen: {decision['entry']}: {decision['value']}: {decision['why']}")
         if record["met"]:
-            reporter.say(f"{error}, within every share; probes took {seconds:.1f} s")
+            reporter.say(f"{error}, every share met; probes took {seconds:.1f} s")
     if not record["met"]:
         missed = ", ".join(d["entry"] for d in record["decisions"] if not d["met"])
-        reporter.warn(f"{error}, not within every share: {missed}")
+        reporter.warn(f"{error}, shares not met: {missed}")

@@ -71,11 +71,12 @@ def decide_increments(
         tried.append((counts, cycle.error(counts)))
     error = tried[-1][1]
     why = (
-        f"{' + '.join(map(str, counts))} in the legs of a cycle leave {100 * error:.2g} % of "
-        f"{100 * allowed:.2g} % allowed{'' if error <= allowed else ', the most that are offered'}"
+        f"{' + '.join(map(str, counts))} in the legs of a cycle cause an error of "
+        f"{100 * error:.2g} %, of {100 * allowed:.2g} % "
+        f"allowed{'' if error <= allowed else ', the most available'}"
     )
     if any(case.legs):
-        why += f"; the case's own {sum(case.legs)} leave {100 * cycle.error(case.legs):.2g} %"
+        why += f"; the {sum(case.legs)} of the case cause {100 * cycle.error(case.legs):.2g} %"
     known = [error if isfinite(error) else None for _, error in tried]
     probe = {"legs": [legs for legs, _ in tried], "errors": known}
     return Decision(case.divided(counts), why, allowed, error, probe)

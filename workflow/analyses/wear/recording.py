@@ -20,6 +20,7 @@ from workflow.analyses.wear.checks.warnings import (
 from workflow.analyses.wear.worn.bolts import kept_tensions
 from workflow.analyses.wear.worn.contact_loops import kept_loops
 from workflow.case.text.plain import counted
+from workflow.case.text.readable import percent
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 from workflow.models.progress import ReportsProgress
@@ -66,12 +67,12 @@ class RunLog(Observer):
             warn_of_growth(self.contacts.stages, after, self.run.reporter)
         drift, spent = after.drift[-1], after.spent - before.spent
         if after.solutions > before.solutions:
-            self.run.reporter.log(f"drift {drift:.2%}: loads computed again")
+            self.run.reporter.log(f"drift {percent(drift)}: loads computed again")
         depths = ", ".join(f"{depth * 1e3:.3f}" for depth in after.kinetics[-1, :, :2].ravel())
         self.run.reporter.log(
             f"jump {after.jump}: {after.cycles[-1]:.6g} cycles, depths {depths} um, "
             f"{counted(spent.steps, 'step')}, {counted(spent.contact_solves, 'contact problem')}, "
-            f"{spent.convolutions} convolutions, drift {drift:.2%}"
+            f"{spent.convolutions} convolutions, drift {percent(drift)}"
         )
 
     def remaining(self, state: CoupledState, jumps: int) -> None:

@@ -60,13 +60,13 @@ def run_wear(run: Run[WearCase]) -> None:
             with one_thread():
                 write_output(outcome, probe_results, run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
-        remedy = f"; the state is kept, see `{folder.resume_command}`"
+        remedy = f"; the state is stored, continue with `{folder.resume_command}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
     except MotionError as error:
         raise UserError(
-            "wear.motion: the surfaces move over each other, and that of body 1 changes from place "
-            "to place (evolution.scope: local), which no wear step follows; allowed: motion: "
-            "neglect, or scope: global"
+            "wear.motion: the surfaces move over each other, and the wear of body 1 depends on "
+            "the place (evolution.scope: local), which wear steps cannot follow; allowed: "
+            "motion: neglect, or scope: global"
         ) from error
     except MeshError as error:
         raise UserError(f"{folder.case}: structure: {error}") from error
@@ -181,8 +181,8 @@ def _check_structure(
     warn_of_structure(case, structure, reporter)
     if case.friction_evolves and case.recoupling.resultants == "constant":
         reporter.warn(
-            "friction.evolution: the structure keeps its first coefficient "
-            "(coupling.resultants: constant)"
+            "friction.evolution: the structure keeps its first coefficient (coupling.resultants: "
+            "constant)"
         )
     if structure.model.nonlinearity.check:
         with reporter.stage("nonlinearity check"):

@@ -21,8 +21,8 @@ from workflow.shell.run_time import (
 # by depth or volume; and of recorded jumps of explicit steps. Only the first holds for every case.
 AUTOMATIC, AUTOMATIC_FULL, BY_SIZE, RECORDED = 15, 40, 30, 10
 # Reason for an unknown number of steps.
-UNKNOWN = "how many jumps there are depends on {}, and is reported as the run goes"
-STICKING = "how far wear moves the zone that sticks"
+UNKNOWN = "the number of jumps depends on {}, and is reported during the run"
+STICKING = "how far wear moves the stick zone"
 # Time to write a jump [s].
 JUMP = 0.02
 # Contact problems per dissipating increment and step, by kind of step.

@@ -77,6 +77,6 @@ def check_section(case: WearCase, face: ContactFace) -> None:
     reach = 0.5 * grid.size[1 if stress.section == "x" else 0]
     if abs(stress.at) > reach:
         raise UserError(
-            f"stress.at: {stress.at:g} mm is off the contact's grid; "
-            f"allowed: {-reach:.4g} to {reach:.4g} mm"
+            f"stress.at: {stress.at:g} mm is outside the contact's grid; allowed: {-reach:.4g} to "
+            f"{reach:.4g} mm"
         )

@@ -55,7 +55,7 @@ def text_of(file: str | Path) -> str:
     except (OSError, UnicodeDecodeError) as error:
         raise _unreadable(str(file), error, allowed) from error
     if NO_TEXT.search(text):
-        raise InputFileError(f"{file}: cannot be read (bytes that are no text){allowed}")
+        raise InputFileError(f"{file}: cannot be read (it is not text){allowed}")
     return text
 
 
@@ -164,7 +164,9 @@ def read_array(file: str) -> np.ndarray:
             there = ", ".join(found)
     except Exception as error:  # numpy raises many kinds of exception for other or damaged files
         raise _unreadable(name, error) from error
-    raise InputFileError(f"{name}: {array or 'which array?'}: allowed with a colon: {there}")
+    raise InputFileError(
+        f"{name}: {array or 'which array?'}: name an array after a colon; allowed: {there}"
+    )
 
 
 def _read_dataset(file: str, dataset: str) -> np.ndarray:

@@ -48,7 +48,7 @@ def read_tmd(data: bytes) -> Scan:
     comment = data.index(b"\0", title) + 1
     if b"surfalize" in data[title:comment]:
         raise InputError(
-            "surfalize wrote it, up to version 0.19 in um where the format has mm: save as .x3p"
+            "surfalize up to version 0.19 wrote it, in um where the format has mm: save it as .x3p"
         )
     nx, ny, size_x, size_y = struct.unpack_from("<2I2f", data, comment)
     return Scan(_lines(data, comment + 24, "<f4", nx, ny), (size_x / nx, size_y / ny))
@@ -81,7 +81,7 @@ def _opd_pixels(data: bytes, place: int) -> Array:
     """Return pixels ``(nx, ny)``, stored column by column from the last line up."""
     nx, ny, size = struct.unpack_from("<3H", data, place)
     if size not in OPD_PIXELS:
-        raise InputError(f"heights of {size} bytes each, which are not known")
+        raise InputError(f"heights of {size} bytes each, which is not supported")
     pixels = _lines(data, place + 6, OPD_PIXELS[size], ny, nx).T[:, ::-1]
     return np.where(pixels < OPD_MISSING[size], pixels, np.nan)
 
@@ -90,7 +90,7 @@ def _lines(data: bytes, place: int, code: str, nx: int, ny: int) -> Array:
     """Return numbers ``(nx, ny)`` that are stored line by line, x first."""
     there = (len(data) - place) // np.dtype(code).itemsize
     if not 0 < nx * ny <= there:
-        raise InputError(f"{there} of {nx} x {ny} heights in it: it is cut off or damaged")
+        raise InputError(f"{there} of {nx} x {ny} heights in it: it is incomplete or damaged")
     numbers = np.frombuffer(data, code, nx * ny, place)
     return numbers.reshape(ny, nx).T.astype(np.float64)
 

@@ -44,7 +44,7 @@ def account(loops: MeasuredLoops) -> str:
     count = len(loops.energy)
     return (
         f"{count} closed loop{'s' if count > 1 else ''} of {loops.energy.sum():.4g} mJ; left out, "
-        f"of {work:.4g} mJ of work on the record: {before:.3g} mJ before the first loop, "
+        f"of {work:.4g} mJ of work in the record: {before:.3g} mJ before the first loop, "
         f"{between:.3g} between loops, {after:.3g} after the last; reversals closer than "
-        f"{1e3 * loops.resolution:.2g} um are taken for noise"
+        f"{1e3 * loops.resolution:.2g} um are taken as noise"
     )

@@ -83,8 +83,8 @@ def read_scan(file: str, unit: str | None, pitch: tuple[float, float] | None) ->
     ending = Path(name).suffix.lower()
     if ending not in ENDINGS:
         raise InputFileError(
-            f"{file}: no scan in a format that is read; allowed: {', '.join(ENDINGS)}: export it "
-            "as .x3p, .sur or x, y, z in text"
+            f"{file}: no scan in a supported format; allowed: {', '.join(ENDINGS)}: export it as "
+            ".x3p, .sur or x, y, z in text"
         )
     if ending in PROFILOMETER:
         _check_own_units(file, unit, pitch)
@@ -99,7 +99,7 @@ def _bare(file: str, heights: Array, unit: str | None, pitch: tuple[float, float
     if unit is None or pitch is None:
         missing = " and ".join(key for key, at in (("unit", unit), ("pitch", pitch)) if at is None)
         raise InputFileError(
-            f"{file}: bare heights do not say their {missing}; allowed: both beside the file"
+            f"{file}: bare heights do not state their {missing}; allowed: state both with the file"
         )
     if heights.dtype.kind not in "iuf" or heights.ndim not in (1, 2) or heights.size == 0:
         raise InputFileError(
@@ -113,7 +113,7 @@ def _bare(file: str, heights: Array, unit: str | None, pitch: tuple[float, float
 def _check_own_units(file: str, unit: str | None, pitch: tuple[float, float] | None) -> None:
     given = " and ".join(key for key, at in (("unit", unit), ("pitch", pitch)) if at is not None)
     if given:
-        raise InputFileError(f"{file}: says its units and pitch itself; allowed: no {given}")
+        raise InputFileError(f"{file}: states its units and pitch itself; allowed: no {given}")
 
 
 def _checked(file: str, read: Callable[[], Scan]) -> Scan:
@@ -171,8 +171,8 @@ def _read_text(file: str, unit: str | None, pitch: tuple[float, float] | None) -
         return _bare(file, _read_matrix(file), unit, pitch)
     if unit is None:
         raise InputFileError(
-            f"{file}: points x, y, z without a unit; allowed: {HEADINGS}, or the unit of all three "
-            "beside the file"
+            f"{file}: points x, y, z without a unit; allowed: {HEADINGS}, or state the unit of "
+            "all three"
         )
     scan = _read_points(TableFile(file, rows[0][0], ("x", "y", "z"), tuple(rows)), unit)
     own, beside = scan.pitch, pitch or scan.pitch
@@ -271,7 +271,7 @@ def _steps(table: TableFile, name: str, at: Array) -> tuple[np.ndarray, float]:
     beside = np.abs(numbers - np.rint(numbers)) > max(REGULAR, 1e-9)
     for point in np.flatnonzero(beside).tolist():
         raise table.refusal(
-            point, name, f"beside a regular grid of {step:.6g} mm", "points of a regular grid"
+            point, name, f"not on a regular grid of {step:.6g} mm", "points of a regular grid"
         )
     return np.rint(numbers).astype(np.int64), step
 
@@ -323,8 +323,8 @@ def _by_library(library: Any, file: Path) -> Scan:
         pitch = float(surface.step_x), float(surface.step_y)
     if surface.metadata.get("inverted"):
         raise InputError(
-            "its heights are marked as inverted, which some programs take for their sign and some "
-            "for a note: export it without, or as .x3p"
+            "its heights are marked as inverted, which some programs mean as their sign and some "
+            "as a note: export it without, or as .x3p"
         )
     return Scan(lines.T / TO_MICRONS, (pitch[0] / TO_MICRONS, pitch[1] / TO_MICRONS))
 
@@ -343,7 +343,8 @@ def write_scan(file: Path, scan: Scan) -> None:
     lines = TO_MICRONS * scan.heights.T
     if ending == ".sur" and scan.missing and np.nanmin(lines) == np.nanmax(lines):
         raise UserError(
-            f"{file}: one height and missing points, of which .sur keeps neither; allowed: .x3p"
+            f"{file}: a single height, and missing points, neither of which .sur can store; "
+            "allowed: .x3p"
         )
     # For a surface of one height the library computes 0 / 0, but still writes it correctly.
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):

@@ -52,7 +52,7 @@ class Explanation:
         # enough.
         reported = [d for d in errors if d["type"] != "missing" or self._path(d) not in meant]
         lines = [line for _, line in sorted({self._line_about(details) for details in reported})]
-        return [*lines, f"{self.source.name}: and {left} more like these"] if left else lines
+        return [*lines, f"{self.source.name}: and {left} more errors"] if left else lines
 
     def _line_about(self, details: ErrorDetails) -> tuple[int, str]:
         """Return the line number, for sorting, and the line of text about one error."""

@@ -36,8 +36,8 @@ CURVES = {
     ),
     **over(
         "time place",
-        displacement=("mm", "displacements of what is seen"),
-        acceleration=("mm/s^2", "accelerations of what is seen"),
+        displacement=("mm", "displacements of the reported points"),
+        acceleration=("mm/s^2", "accelerations of the reported points"),
     ),
 }
 

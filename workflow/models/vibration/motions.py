@@ -24,25 +24,28 @@ TIMES = 1024
 # Tolerance on the frequency of the largest amplitude, relative to it.
 RESONANCE_TOLERANCE = 1e-6
 
-SEEN = "half of the way to and fro of what is seen, the last looked at"
+SEEN = "half the peak-to-peak motion of the reported points, the last being the main one"
 SLIPS = "share of the cycle in which a joint slips, mean of those that touch at rest"
 COLUMNS = {
     **over(
         "point place",
         amplitude=("mm", f"{SEEN}; relative to the ground if it moves"),
-        absolute_amplitude=("mm", f"{SEEN}, that of the ground included"),
+        absolute_amplitude=("mm", f"{SEEN}, including that of the ground"),
     ),
     **over(
         "point",
         phase=(
             "rad",
-            "of harmonic 1 of what is looked at before the force, or before a sine at t = 0",
+            "phase by which harmonic 1 of the reported point leads the force, or a sine at t = 0",
         ),
         energy_per_cycle=("N mm", "energy that the joints dissipate in a cycle"),
         damping=("1", "energy lost in a cycle over 4π times the largest kinetic energy"),
         slip=("1", SLIPS),
-        separated=("1", "share of the cycle in which they are apart"),
-        left_out=("1", "estimated share of the joints' vibration in harmonics left out"),
+        separated=("1", "share of the cycle in which they are open"),
+        left_out=(
+            "1",
+            "estimated share of the joints' vibration in harmonics that are not included",
+        ),
     ),
 }
 """Columns of the motions along a curve; absolute amplitudes only where the ground moves."""

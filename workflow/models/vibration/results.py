@@ -29,7 +29,7 @@ def linear_limits(amount: ExcitationSize) -> dict[str, Declared]:
     """Return the declaration of the linear limits under an amount: a force or a level."""
     unit, _ = amount.receptance
     first = "" if amount is FORCE else ", of harmonic 1"
-    size = f"amplitude of what is looked at over the {amount.name}{first}"
+    size = f"amplitude of the reported point over the {amount.name}{first}"
     return over(
         "frequency",
         frequency=("Hz", "frequency of the force"),

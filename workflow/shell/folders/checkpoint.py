@@ -59,7 +59,7 @@ def load(folder: OutputFolder, provenance: Mapping[str, Any]) -> StoredState:
         try:
             same = checked_digest(path) == kept
         except OSError:
-            raise UserError(f"{path}: missing or not to be read; {folder.again}") from None
+            raise UserError(f"{path}: missing or unreadable; {folder.again}") from None
         except DamagedFile as error:
             raise UserError(f"{error}; {folder.again}") from error
         if not same:

@@ -143,8 +143,8 @@ class OutputFolder:
 
     def reserve_state(self) -> None:
         """Reserve the entries that the run needs in order to resume."""
-        self.reserve("checkpoint.h5", "how far the run has come, for it to go on from")
-        self.reserve(STATE, "what the run has found so far, until it ends").mkdir(exist_ok=True)
+        self.reserve("checkpoint.h5", "state of the run, from which it can continue")
+        self.reserve(STATE, "results of the run so far").mkdir(exist_ok=True)
 
     def discard_state(self) -> None:
         """Remove the intermediate files, and the entry of a checkpoint that was never written.
@@ -176,15 +176,15 @@ class OutputFolder:
 
     def reserve_log(self) -> Path:
         """Return the path of the log."""
-        return self.reserve("run.log", "what the run said, and when")
+        return self.reserve("run.log", "messages of the run, with times")
 
     def reserve_report(self) -> Path:
         """Return the path of the report."""
-        return self.reserve(REPORT, "all of the run on one page, for people")
+        return self.reserve(REPORT, "report of the run on one page")
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Write the summary, which marks the run as finished."""
-        write_json(self.reserve("summary.json", "what came out, in numbers"), summary)
+        write_json(self.reserve("summary.json", "results, in numbers"), summary)
 
     def finish(self, summary: Mapping[str, Any], provenance: Mapping[str, Any]) -> None:
         """Write the summary of a run with digests of everything that belongs to it.
@@ -222,7 +222,7 @@ class OutputFolder:
         if not self.summary.exists():
             how = f"start it again with `{self.run_command}`"
             if self.lists_state:
-                how = f"go on with `{self.resume_command}`"
+                how = f"continue with `{self.resume_command}`"
             raise UserError(f"{self.root}: this run is not finished; {how}")
 
     def check_finished(self, case: Mapping[str, Any]) -> None:
@@ -239,7 +239,7 @@ class OutputFolder:
     def _check(self, name: str, kept: str | None, case: Mapping[str, Any]) -> None:
         path = self.root / name
         if kept != (json_digest(case) if path == self.case else file_digest(path)):
-            raise UserError(f"{path}: not as the run in {self.root} had it; {self.again}")
+            raise UserError(f"{path}: differs from the run in {self.root}; {self.again}")
 
     @property
     def run_command(self) -> str:

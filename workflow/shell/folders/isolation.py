@@ -34,4 +34,4 @@ class Isolation:
             if what not in self._failed:
                 self._failed.add(what)
                 told = f"{type(error).__name__}: {one_line(error)}"
-                self._warn(f"{what}: not written ({told}); the results are whole")
+                self._warn(f"{what}: not written ({told}); the results are complete")

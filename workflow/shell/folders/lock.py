@@ -49,12 +49,12 @@ def locked(root: Path, patience: float = 0.0, take_over: bool = False) -> Iterat
         holder = _holder(left)
         if left and not take_over and not (alone and left.get("host") == socket.gethostname()):
             raise UserError(
-                f"{root}: in use by {holder}, as far as can be seen from here; wait for its end, "
-                f"or remove {path} if it has gone"
+                f"{root}: apparently in use by {holder}; wait for its end, or remove {path} if it "
+                "is gone"
             )
         try:
             _write(file, path)
-            yield f"{holder} has gone and left its lock on {root}, which is taken" if left else ""
+            yield f"{holder} is gone and left its lock on {root}, which is removed" if left else ""
         finally:
             path.unlink(missing_ok=True)
     finally:

@@ -78,7 +78,7 @@ class RunSteps:
         self._going_on = False
         self._saved, self._cost = time.perf_counter(), FIRST_SAVE
         if run.kept is not None:
-            run.reporter.say(f"  goes on after {counted(self._before, 'step')}")
+            run.reporter.say(f"  continues after {counted(self._before, 'step')}")
 
     def __call__(self, name: str, step: Callable[[], T]) -> T:
         place = self._next()
@@ -115,7 +115,7 @@ class RunSteps:
 
     def report(self) -> None:
         """Log how many steps this process has computed."""
-        self._reporter.log(f"steps: {self._computed} computed, {self._before} taken as kept")
+        self._reporter.log(f"steps: {self._computed} computed, {self._before} resumed")
 
     def save(self) -> None:
         """Save the results that are not on disk yet."""

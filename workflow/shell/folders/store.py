@@ -192,7 +192,7 @@ def checked_digest(path: Path) -> str:
     with opened(path) as raw:
         kept = raw.read(SEAL).rstrip(b"\0").decode("ascii", "replace")
         if _digest(raw, path.name) != kept:
-            raise DamagedFile(f"{path}: damaged: not what was written there")
+            raise DamagedFile(f"{path}: damaged: it differs from what was written")
     return kept
 
 

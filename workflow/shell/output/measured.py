@@ -239,7 +239,10 @@ def doubts_of_measured(content: Sequence[dict[str, Any]]) -> Iterator[str]:
             yield f"measured.{number}: not compared: {one['refused']}"
         elif one["outside"]:
             places = ", ".join(str(readable(x, one["at_unit"])) for x in one["outside"])
-            yield f"measured.{number}: {one['curve']}: not computed at {places}: left out"
+            yield (
+                f"measured.{number}: {one['curve']}: not computed at {places}, which are not "
+                "compared"
+            )
 
 
 def lines_of_measured(content: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -252,8 +255,9 @@ def lines_of_measured(content: Sequence[dict[str, Any]]) -> Iterator[str]:
         share = one["relative_rms_deviation"]
         everyday = everyday_unit(unit, one["curve"])
         yield (
-            f"  measured: {one['curve']}: {one['points']} of {one['points'] + len(one['outside'])} "
-            f"points, off by {readable(one['rms_deviation'], unit, None, everyday)} rms"
+            f"  measured: {one['curve']}: {one['points']} of "
+            f"{one['points'] + len(one['outside'])} points, differing by "
+            f"{readable(one['rms_deviation'], unit, None, everyday)} rms"
             + (f" ({percent(share)})" if share is not None else "")
             + (f", chi² {chi:.3g} per point" if chi is not None else "")
             + f", most at {readable(worst['at'], one['at_unit'])}"
@@ -303,8 +307,7 @@ def _table(entry: Measured, file: str) -> TableFile:
     table.require([at, values], "the headings that columns names, or at and values")
     if deviations in table.names and not (entry.deviation is entry.relative_deviation is None):
         raise InputFileError(
-            f"{table.place}: {deviations}: given beside a deviation in the case; "
-            "allowed: one of them"
+            f"{table.place}: {deviations}: given with a deviation in the case; allowed: one of them"
         )
     return table
 

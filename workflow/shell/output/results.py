@@ -144,7 +144,7 @@ def read_contents(path: Path, kind: type[Any] | None) -> Any:
         return None if kind is None else TypeAdapter(kind).validate_json(text)
     except ValidationError as error:
         raise UserError(
-            f"{path}: does not say what it holds: of another version; run the case again"
+            f"{path}: has no contents list: of another version; run the case again"
         ) from error
 
 

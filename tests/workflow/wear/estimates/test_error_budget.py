@@ -100,8 +100,8 @@ def test_parts_of_opposite_sign_cancel_but_for_what_each_is_uncertain_by() -> No
     drawn = off[0] * parts["mesh"] + off[1] * parts["increments"]
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.hypot(0.01, 0.025), rel=0.02)
     assert list(sentences({"volume": error})) == [
-        "estimated errors: volume 2.7%",
-        "most of volume: mesh +4.0%, increments -3.0%",
+        "estimated errors: volume 2.7 %",
+        "largest parts for volume: mesh +4.0 %, increments -3.0 %",
     ]
 
 
@@ -114,7 +114,7 @@ def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> N
     assert warning_of("pad", errors, 0.05, REMEDIES) is None
     line = warning_of("pad", errors, 0.04, REMEDIES)
     assert line is not None
-    assert "depth 4.6%" in line
+    assert "depth 4.6 %" in line
     assert "worn peak" not in line  # edges may be farther off
     assert REMEDIES["mesh"] in line
 
@@ -182,7 +182,7 @@ def test_advice_on_steps_of_given_accuracy_helps(tmp_path) -> None:
     """The setting that the budget names for the steps' error of a peak makes it smaller."""
     asked = (*BARE, "wear.step={kind: implicit}", "accuracy=0.2 %")
     first = _summary_of(CYLINDER, tmp_path / "first", *asked)
-    advice = _advice(first["warnings"], "mostly by steps")
+    advice = _advice(first["warnings"], "mainly due to steps")
     assert advice.startswith("wear.tolerance=")
     second = _summary_of(CYLINDER, tmp_path / "second", *asked, advice)
     errors = [

@@ -51,4 +51,4 @@ def test_edges_that_are_taken_straight_are_doubted(tmp_path):
     midsides[arc] = foot.mesh.p[:, foot.mesh.facets[:, arc]].mean(axis=1).T
     told = replace(mesh, bodies=(block, replace(foot, midsides=midsides)))
     (doubt,) = folded_elements(told, imported)
-    assert doubt.startswith("foot: midside nodes fold elements, of which 3 edges of ")
+    assert doubt.startswith("foot: midside nodes fold some elements, so 3 edges of ")

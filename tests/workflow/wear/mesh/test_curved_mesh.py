@@ -27,7 +27,7 @@ PEAK = {
     2: HertzCylinder(FORCE, RADIUS, MODULUS).peak_pressure,
     3: HertzSphere(FORCE, RADIUS, MODULUS).peak_pressure,
 }
-FORM = "vertices alone tell the form"
+FORM = "the form of its faces is uncertain"
 GRID = {2: (512, 1), 3: (128, 128)}
 
 
@@ -167,7 +167,7 @@ def test_hertz_of_a_mesh_that_is_coarser_than_the_contact(tmp_path, dimension: i
     summary = run(case, tmp_path / "out")
     assert summary["sole"]["peak_pressure"]["unworn"] == pytest.approx(PEAK[dimension], rel=0.015)
     told = [line for line in summary["warnings"] if line.startswith("sole: ")]
-    assert any("the peak load is carried by" in line for line in told), told
+    assert any("carry the peak load" in line for line in told), told
     assert not any(FORM in line for line in told), told
 
 

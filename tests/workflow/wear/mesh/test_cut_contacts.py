@@ -139,4 +139,4 @@ def test_heights_of_another_shape_beyond_the_plane_are_refused(tmp_path):
     across_y, across_x = (write(tmp_path, planes, gap=heights) for planes in ((1,), (0, 1)))
     assert invoke("check", across_y).exit_code == 0
     line = refused(across_x)
-    assert "gap.npy: not the same on both sides of a plane of symmetry across x" in line
+    assert "gap.npy: not symmetric about a plane of symmetry across x" in line

@@ -53,7 +53,10 @@ def test_sector_runs(tmp_path, order):
 
 def test_cuts_that_do_not_match_run(tmp_path):
     case = case_of(tmp_path, moved=0.3)
-    assert "wheel_low and wheel_high do not match, tied by a mortar" in invoke("check", case).output
+    assert (
+        "wheel_low and wheel_high do not match and are tied by a mortar"
+        in invoke("check", case).output
+    )
     assert run(case, tmp_path / "out")["structure"]["equilibrium_error"] < 1e-6
 
 
@@ -62,10 +65,10 @@ def test_cuts_that_do_not_match_run(tmp_path):
     [
         (["structure.cyclic.0.sectors=5"], "wheel_high is not wheel_low turned about the axis"),
         (["structure.cyclic.0.sectors=1"], "structure.cyclic.0.sectors"),
-        (["structure.cyclic.0.axis=[0, 0, 0]"], "no direction; allowed: one that is not zero"),
+        (["structure.cyclic.0.axis=[0, 0, 0]"], "no direction; allowed: a vector that is not zero"),
         (["structure.cyclic.0.axis=[0, 0, 1]"], "an axis in the plane; allowed: [0, 1, 0]"),
-        (["structure.cyclic.0.high=wheel_low"], "wheel_low is both cuts"),
-        (["structure.cyclic.0.low=[]"], "none; allowed: a boundary, or several"),
+        (["structure.cyclic.0.high=wheel_low"], "wheel_low is on both cuts"),
+        (["structure.cyclic.0.low=[]"], "none; allowed: one boundary or several"),
         (["structure.cyclic.0.high=wheel_cut"], "no boundary wheel_cut on body wheel"),
         (["structure.cyclic.0.high=shoe_0_top_0"], "on body wheel"),
         (["structure.cyclic.0.high=wheel_rim"], "wheel_rim is not wheel_low turned"),

@@ -58,14 +58,14 @@ def _said(case, *options):
 
 def test_a_forgotten_unit_is_doubted(blocks, tmp_path):
     """Metres read as mm make bodies of µm, with 4 N on a millionth of their face."""
-    assert "doubt: " not in _said(blocks)
+    assert "warning: " not in _said(blocks)
     divided(tmp_path / "blocks.inp", 1000.0)
     said = _said(blocks)
     assert re.search(
-        r"doubt: structure\.length_unit: bodies of 3 µm.*; 3 mm if they are in m", said
+        r"warning: structure\.length_unit: bodies of 3 µm.*; 3 mm if they are in m", said
     )
-    assert "structure.loads.1: presses with about" in said
-    assert "doubt: " not in _said(blocks, "--set", METRES)
+    assert "structure.loads.1: gives a pressure of about" in said
+    assert "warning: " not in _said(blocks, "--set", METRES)
     moved = "{kind: displacement, group: foot_high, path: [0, 1, 0, 0], "
     moved += "displacement: [0.8 mm, 0, 0]}"
     said = _said(blocks, "--set", METRES, "--set", f"structure.loads.1={moved}")
@@ -122,10 +122,10 @@ def test_metres_of_a_universal_file_are_asked_about(tmp_path):
     case = write_case(tmp_path / "cubes.yaml", structure, {"increments": [1, 1]}, grid=(8, 8))
     said = _said(case)
     assert "in m, as cubes.unv:2 says, converted to mm; bodies within 1000 x 1000 x 3000" in said
-    assert "doubt: structure.length_unit: lengths are in m, as cubes.unv:2 says" in said
+    assert "warning: structure.length_unit: lengths are in m, as cubes.unv:2 says" in said
     for unit, sides in (("mm", "1 x 1 x 3 mm"), ("m", "1000 x 1000 x 3000 mm")):
         said = _said(case, "--set", f"structure.length_unit={unit}")
-        assert "doubt: structure.length_unit" not in said
+        assert "warning: structure.length_unit" not in said
         assert f"bodies within {sides}" in said
 
 

@@ -144,7 +144,7 @@ def test_a_shortening_is_as_long_as_it_is(clamp, tmp_path):
     [
         (["structure.loads.0.body=rod"], "no body rod; allowed: frame, block"),
         (["structure.loads.0.through=[0, 0, 99]"], "does not cut body frame"),
-        (["structure.loads.0.path=[0, 1, 1, 1]"], "in which the bolt gets its force"),
+        (["structure.loads.0.path=[0, 1, 1, 1]"], "in which the bolt is tightened"),
         (["structure.loads.0.axis=[0, 0, 0]"], "no direction"),
         (["load_path.cycle_from=1"], "would be tightened in every cycle"),
         (

@@ -12,6 +12,7 @@ from wear.contact.link import StructureLink
 from workflow.analyses.wear.output.link_report import report_link
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import face_contact
+from workflow.case.text.readable import percent
 from workflow.kinds import load_case
 from workflow.models.contact import FaceContact
 from workflow.shell.terminal.reporter import Reporter
@@ -28,7 +29,7 @@ def test_a_run_says_how_its_contacts_are_linked(whole) -> None:
         assert link["corrected"]
         assert len(link["degrees"]) == 2
         assert 0.1 < link["bodies"] < 1.0
-        assert f"{name}: the bodies deform by {link['bodies']:.1%} of what half-spaces do" in log
+        assert f"{name}: the bodies add {percent(link['bodies'])}" in log
 
 
 @pytest.mark.parametrize(

@@ -255,13 +255,13 @@ def test_shear_that_nobody_knows_is_warned_of(share: float, count: int) -> None:
         unknown[1, increment] = share
         _report_stick(unknown, 1, heard)
         assert [line[:13] for line in heard.said] == (
-            ["up to 30% of "] * more + ["stress.life l"] * count
+            ["up to 30 % of"] * more + ["stress.life l"] * count
         )
 
 
 @pytest.mark.parametrize(
     ("fits", "told"),
-    [([0.01, 0.02], ""), ([0.01, 0.04], "known but for 4.0%"), ([0.01], "too few nodes")],
+    [([0.01, 0.02], ""), ([0.01, 0.04], "uncertain by 4.0 %"), ([0.01], "too few nodes")],
 )
 def test_what_is_not_known_of_the_structure_is_warned_of(fits: list[float], told: str) -> None:
     links = [
@@ -291,7 +291,10 @@ def test_switched_off_it_leaves_nothing(start: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("overrides", "words"),
     [
-        (["stress.at=31 mm"], "stress.at: 31 mm is off the contact's grid; allowed: -30 to 30 mm"),
+        (
+            ["stress.at=31 mm"],
+            "stress.at: 31 mm is outside the contact's grid; allowed: -30 to 30 mm",
+        ),
         (["stress.depth=10 um"], "allowed: above life.depth, 0.02 mm"),
         (["structure.dimension=2", "stress.section=y"], "a line contact has no length along y"),
     ],

@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
 from workflow.analyses.contact.output.layout import BODIES, ContactContents
+from workflow.case.text.readable import percent
 from workflow.pictures.fields import (
     FLAT,
     MARGIN,
@@ -176,7 +177,7 @@ def _draw_regions(
     shown.set_cmap(ListedColormap(["white", STICK, SLIP]))
     _draw_arrows(axis, state["shear"][()], grid, view, turned)
     stuck = np.count_nonzero(regions == 1.0) / max(int(np.count_nonzero(pressed)), 1)
-    axis.set_title(f"shear on body 2: {stuck:.1%} of the contact sticks")
+    axis.set_title(f"shear on body 2: {percent(stuck)} of the contact sticks")
     figure.legend(
         handles=[Patch(color=STICK, label="stick"), Patch(color=SLIP, label="slip")],
         loc="outside lower center",
@@ -239,9 +240,9 @@ def forces(file: h5py.File) -> Figure:
 
 
 def _forces_title(history: h5py.Group, energy: float) -> str:
-    text = f"{energy:.4g} {_in_millijoules(history)} dissipated in all"
+    text = f"{energy:.4g} {_in_millijoules(history)} dissipated in total"
     if history.attrs["method"] != "full":
-        text += "; only the turning points are computed"
+        text += "; only turning points are computed"
     return text
 
 

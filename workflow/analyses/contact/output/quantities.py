@@ -12,8 +12,8 @@ from workflow.shell.output.summary import estimate, told
 LAST, LOOP = "after the last increment", "last closed cycle"
 MOTIONS = {
     "approach": "motion of the bodies towards each other",
-    "shift_x": "motion over each other along x",
-    "shift_y": "motion over each other along y",
+    "shift_x": "relative motion along x",
+    "shift_y": "relative motion along y",
     "tilt_x": "tilt about x",
     "tilt_y": "tilt about y",
     "twist": "twist about z",
@@ -22,11 +22,11 @@ MOTIONS = {
 NUMBERS = {
     "peak_pressure": ("MPa", "largest pressure"),
     "central_pressure": ("MPa", "pressure in the middle"),
-    "contact_radius": ("mm", "contact radius (of a disk as large)"),
+    "contact_radius": ("mm", "contact radius (of a disk of equal area)"),
     "contact_half_width": ("mm", "contact half width"),
     "contact_area": ("mm^2", "contact area"),
     "peak_shear": ("MPa", "largest shear"),
-    "stick_radius": ("mm", "stick radius (of a disk as large)"),
+    "stick_radius": ("mm", "stick radius (of a disk of equal area)"),
     "stick_half_width": ("mm", "stick half width"),
     "cumulative_energy": ("N mm", "energy dissipated so far"),
 }

@@ -22,6 +22,7 @@ from workflow.analyses.contact.output.summary import (
     stick_zone,
 )
 from workflow.case.text.plain import counted
+from workflow.case.text.readable import percent
 from workflow.shell.analysis import Run
 from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish
@@ -128,8 +129,8 @@ def _lines(summary: dict[str, Any], grid: Grid) -> Iterator[str]:
     left = ""
     if history["error"] is not None:
         left = (
-            f", shear within {history['error']:.1%} of µP, energy within "
-            f"{history['energy_error']:.1%}"
+            f", shear within {percent(history['error'])} of µP, energy within "
+            f"{percent(history['energy_error'])}"
         )
     yield (
         f"{counted(summary['increments'], 'increment')}{computed} ({history['method']})"

@@ -73,11 +73,13 @@ class MatrixUnits(Section):
     """Units of matrices."""
 
     length: Annotated[str, UnitName("mm")] = entry(
-        "of displacements; rotations are in rad, times in s", "mm"
+        "unit of displacements; rotations are in rad, times in s", "mm"
     )
-    force: Annotated[str, UnitName("N")] = entry("of stiffness times length", "N")
+    force: Annotated[str, UnitName("N")] = entry("unit of stiffness times length", "N")
     mass: Annotated[str, UnitName("t")] | None = entry(
-        "without it that which fits: kg for N and m, t for N and mm", "t", default=None
+        "unit of mass; without it the one that fits: kg for N and m, t for N and mm",
+        "t",
+        default=None,
     )
 
 
@@ -87,33 +89,40 @@ class MatrixFiles(Section):
     also_filled_in: ClassVar[tuple[str, ...]] = ("file",)
 
     file: Annotated[str, File(ENDINGS)] | None = entry(
-        "of all that has no file below, by usual names: stiffness or K, mass or M, damping or C, "
-        "loads or F, Nastran's KAAX, MAAX, BAAX, PAX; .mtx: Abaqus' substructures",
+        "file of all matrices without a file below, under usual names: stiffness or K, mass or "
+        "M, damping or C, loads or F, Nastran's KAAX, MAAX, BAAX, PAX; .mtx: Abaqus' "
+        "substructures",
         "matrices.h5",
         default=None,
     )
     stiffness: Annotated[str, File(ENDINGS)] | None = entry(
-        "of its own; a matrix of several by its name: plant.mat:Kred", "k.mtx", default=None
+        "file of the stiffness; a matrix of several by its name: plant.mat:Kred",
+        "k.mtx",
+        default=None,
     )
-    mass: Annotated[str, File(ENDINGS)] | None = entry("of its own", "m.mtx", default=None)
+    mass: Annotated[str, File(ENDINGS)] | None = entry("file of the mass", "m.mtx", default=None)
     damping: Annotated[str, File(ENDINGS)] | None = entry(
-        "viscous, of its own; damping_ratio comes to it", "c.mtx", default=None
+        "file of the viscous damping; damping_ratio is added to it", "c.mtx", default=None
     )
     loads: Annotated[str, File(ENDINGS)] | None = entry(
-        "of its own: a column for each load, its forces over the load", "f.mtx", default=None
+        "file of the loads: a column for each load, its forces per unit of load",
+        "f.mtx",
+        default=None,
     )
     unknowns: Annotated[str, File((".csv",))] | None = entry(
-        "what the rows are, where files do not say it: columns point and direction (x, y, z, rx, "
-        "ry, rz or modal), if known x, y, z; or names of nodes: columns node and point",
+        "meaning of the rows, if files do not state it: columns point and direction (x, y, z, "
+        "rx, ry, rz or modal), if known x, y, z; or names of nodes: columns node and point",
         "unknowns.csv",
         default=None,
     )
-    units: MatrixUnits = entry("of all files")
+    units: MatrixUnits = entry("units of all files")
 
     @model_validator(mode="after")
     def _whole(self) -> MatrixFiles:
         if self.file is None and (self.stiffness is None or self.mass is None):
-            raise disagreement("missing; allowed: a file of all, or stiffness and mass", "file")
+            raise disagreement(
+                "missing; allowed: one file of all matrices, or stiffness and mass", "file"
+            )
         return self
 
     @property
@@ -193,7 +202,7 @@ class LoadCase(Section):
     known_by: ClassVar[frozenset[str]] = frozenset({"load"})
 
     load: Annotated[int, Whole(1, 10_000)] = entry(
-        "column of the loads: its forces times the force of the excitation", 1
+        "column of the loads, whose forces are multiplied by the force of the excitation", 1
     )
 
 
@@ -212,20 +221,22 @@ class Matrices(Section):
     """Matrices of a structure."""
 
     kind: Literal["matrices"] = entry("stiffness and mass of another program", "matrices")
-    matrices: MatrixFiles = entry("where they are")
+    matrices: MatrixFiles = entry("files and units of the matrices")
     retained: tuple[Title, ...] = entry(
-        "points, or kinds of them, onto which large matrices are reduced first, by Craig and "
-        "Bampton; without them all are kept",
+        "points, or kinds of them, onto which large matrices are first reduced (Craig-Bampton); "
+        "without them all are kept",
         ["pad", "tip"],
         default=(),
     )
     modes: Annotated[int, Whole(0, 1000)] | None = entry(
-        "lowest ones with the retained points held, beside these", 20, default=None
+        "number of modes kept with the retained points, the lowest ones with these points held",
+        20,
+        default=None,
     )
     massless: Annotated[float, Quantity("Hz", above=0.0, at_most=1e9)] | None = entry(
-        "natural frequency that motions without mass are given, far above those of interest: at a "
-        "frequency f they are (f / massless)² too soft, and damped as modes are; without it points "
-        "without mass follow the others, and no other motion may lack mass [Hz]",
+        "natural frequency that is given to motions without mass, far above those of interest: "
+        "at a frequency f they are (f / massless)² too soft, and damped as modes are; without it "
+        "points without mass follow the others, and no other motion may lack mass [Hz]",
         "200 kHz",
         default=None,
     )
@@ -245,7 +256,7 @@ class MatrixBody(JointedBody, Matrices):
     @model_validator(mode="after")
     def _modes_of_retained(self) -> MatrixBody:
         if self.retained and self.modes is None:
-            raise disagreement("missing; allowed: with retained, from 0 on", "modes", "retained")
+            raise disagreement("missing; allowed: with retained, 0 or more", "modes", "retained")
         if self.modes is not None and not self.retained:
             raise disagreement(
                 f"{self.modes}: given without retained; allowed: with points to keep", "modes"
@@ -260,7 +271,7 @@ class MatrixBody(JointedBody, Matrices):
         self._check_points()
         count = matrices.loads.shape[1]
         if isinstance(self.driven, LoadCase) and self.driven.load > count:
-            none = "points, as there are no loads by a usual name"
+            none = "points, as no loads have a usual name"
             for name in matrices.offered.get("loads", ()):
                 none += f", or matrices.loads: {name}"
             allowed = f"1 to {count}" if count else none
@@ -292,7 +303,7 @@ class MatrixBody(JointedBody, Matrices):
         for key, point in wanted.items():
             there = self.points if key.startswith("retained.") else self.places
             if not matching(there, point):
-                held = ", but not retained" if matching(self.points, point) else ""
+                held = ", because it is not retained" if matching(self.points, point) else ""
                 raise disagreement(
                     f"{shown(point)}: no such point{held}; allowed: {known(there)}", key
                 )
@@ -398,20 +409,20 @@ class MatrixBody(JointedBody, Matrices):
     def outline(self) -> list[tuple[str, str]]:
         matrices = self.matrices.read()
         taken = (f"{part} {name}".rstrip() for part, name in (matrices.taken or {}).items())
-        left = f"; not taken: {', '.join(matrices.left)}" if matrices.left else ""
+        left = f"; not used: {', '.join(matrices.left)}" if matrices.left else ""
         count = len(matrices.unknowns)
         unknowns = f"{count} of {counted(len(self.points), 'point')}: {known(self.points)}"
         modal = sum(u.direction == "modal" for u in matrices.unknowns)
         unknowns += f"; {modal} of modes" if modal else ""
         if matrices.held:
             unknowns += f"; held: {', '.join(u.name for u in matrices.held[:TOLD])}"
-            unknowns += f", {len(matrices.held)} in all" if len(matrices.held) > TOLD else ""
+            unknowns += f", {len(matrices.held)} in total" if len(matrices.held) > TOLD else ""
         masses = matrices.moved_mass()
         mass = ", ".join(f"{plain(m, 't', 4)} along {axis}" for axis, m in masses.items())
         rows = [
             ("matrices", f"{', '.join(taken)}{left}"),
             ("unknowns", unknowns),
-            ("mass", f"{mass}, of all points moved as one"),
+            ("mass", f"{mass}, moved along x, y or z as a whole"),
         ]
         if isinstance(self.driven, LoadCase):
             rows.append(("load", _resultant(matrices, self.driven.load)))
@@ -435,27 +446,27 @@ class MatrixBody(JointedBody, Matrices):
         """Yield plausibility warnings about entries, for motions up to ``highest`` [Hz]."""
         if self.massless is not None and highest > SOFT * self.massless:
             yield (
-                f"structure.massless: {plain(self.massless, 'Hz')}; at {plain(highest, 'Hz', 3)}, "
-                "the highest of the motion, what has no mass is "
-                f"{shares((highest / self.massless) ** 2)} too soft"
+                f"structure.massless: {plain(self.massless, 'Hz')} is too low: at "
+                f"{plain(highest, 'Hz', 3)}, the highest frequency of the motion, what has no "
+                f"mass is {shares((highest / self.massless) ** 2)} too soft"
             )
         matrices = self.matrices.read()
         count = len(matrices.unknowns)
         if count > MANY and not self.retained:
             yield (
-                f"structure.retained: none, so that all {count} unknowns are kept; usual: some "
-                f"points, and modes, for more than {MANY}"
+                f"structure.retained: none, so that all {count} unknowns are kept; usual for more "
+                f"than {MANY}: some points, and modes"
             )
         if names := matrices.offered.get("damping"):
             yield (
-                f"structure.matrices.damping: none by a usual name; {' and '.join(names)} could be "
-                f"it: damping: {names[0]}"
+                f"structure.matrices.damping: no matrix with a usual name; {' and '.join(names)} "
+                f"could be it: damping: {names[0]}"
             )
         for axis, mass in matrices.moved_mass().items():
             if mass and not LIGHTEST <= mass <= HEAVIEST:
                 yield (
-                    f"structure.matrices.units: {plain(mass, 't', 3)} along {axis}, of all points "
-                    "moved as one: are they right?"
+                    f"structure.matrices.units: the mass along {axis} is {plain(mass, 't', 3)}: "
+                    "are they right?"
                 )
                 break
         lowest = self.lowest_frequencies()
@@ -463,7 +474,7 @@ class MatrixBody(JointedBody, Matrices):
         if len(elastic) and not SLOWEST <= elastic[0] <= FASTEST:
             yield (
                 f"structure.matrices.units: the lowest frequency above 0 is {elastic[0]:.3g} Hz: "
-                "are they right, that of mass too?"
+                "are they right, including mass?"
             )
 
 
@@ -474,7 +485,7 @@ def _resultant(matrices: OwnMatrices, number: int) -> str:
         f"{sum(f for f, u in zip(column, matrices.unknowns, strict=True) if u.direction == axis):g}"
         for axis in AXES
     ]
-    return f"{number}, with forces of {', '.join(sums)} along x, y, z in all for a force of 1"
+    return f"{number}, with total forces of {', '.join(sums)} along x, y, z for a force of 1"
 
 
 @lru_cache(4)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 class PointMass(Section):
     """A point with mass."""
 
-    name: Title = entry("by which joints, springs and forces know it", "pad")
-    mass: Mass = entry("in every direction in which it moves [t]", "1.2 kg")
+    name: Title = entry("name of the point in joints, springs and forces", "pad")
+    mass: Mass = entry("mass in every direction in which it moves [t]", "1.2 kg")
 
 
 class PointBody(JointedBody):
@@ -28,10 +28,10 @@ class PointBody(JointedBody):
 
     kind: Literal["points"] = entry("masses at points", "points")
     points: Annotated[tuple[PointMass, ...], Field(min_length=1, max_length=100)] = entry(
-        "their names and masses"
+        "names and masses of the points"
     )
     directions: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = entry(
-        "in which all of them move: one, two, or xyz", "xyz"
+        "directions in which all of them move: one, two, or xyz", "xyz"
     )
 
     @model_validator(mode="after")

@@ -100,7 +100,7 @@ def _rig_on(
         raise EntryError(
             "structure.file",
             "a model whose kept displacements have no names; allowed: one of a specimens run, or "
-            "written with names",
+            "one written with names",
         )
     further = _further_masses(body, reduced.names)
     points, ring, sector = _Points([*reduced.names, *further]), None, None
@@ -293,8 +293,8 @@ def _warn_of_slow(body: MatrixBody, reduced: ReducedModel, reporter: Reporter) -
     fastest = np.sqrt(square[0]) / (2.0 * np.pi)
     if slowest < np.sqrt(RIGID) * fastest:
         reporter.warn(
-            f"the mode of {slowest:.3g} Hz is taken for a rigid motion beside the fastest, "
-            f"{fastest:.3g} Hz; reduce by structure.retained and structure.modes"
+            f"the mode of {slowest:.3g} Hz is so far below the fastest, {fastest:.3g} Hz, that it "
+            "is taken for a rigid motion: reduce by structure.retained and structure.modes"
         )
 
 
@@ -303,8 +303,8 @@ def _told(massless: tuple[str, ...]) -> str:
     if not massless:
         return ""
     return (
-        f"; {listed_names(massless)} have no mass and follow the others statically; allowed there: "
-        "structure.masses"
+        f"; {listed_names(massless)} have no mass and follow the others statically; to give them "
+        "mass: structure.masses"
     )
 
 
@@ -341,8 +341,8 @@ def _further_masses(body: JointedBody, names: Sequence[str]) -> dict[str, float]
         if mass.name in points:
             raise EntryError(
                 f"structure.further_masses.{number}.name",
-                f"'{mass.name}': a point of the body; allowed: others, or structure.masses, which "
-                "adds to points",
+                f"'{mass.name}': a point of the body; allowed: other names, or structure.masses, "
+                "which adds to points",
             )
     return {
         f"{mass.name} {axis}": mass.mass for mass in body.further_masses for axis in mass.directions

@@ -18,23 +18,27 @@ if TYPE_CHECKING:
 class CutFace(Section):
     """Points of a sector that coincide with points of the next one."""
 
-    points: Title = entry("of the face on which the sector ends, such as right", "right")
-    next_points: Title = entry("of the next sector, as many, which they are", "left")
+    points: Title = entry("points of the face on which the sector ends, such as right", "right")
+    next_points: Title = entry(
+        "as many points of the next sector, with which they coincide", "left"
+    )
 
 
 class RingOfSectors(Section):
     """Equal sectors in a ring, of which the body is one; a wave travels round them."""
 
     sectors: Annotated[int, Whole(2, 1000)] = entry(
-        "of the ring; the next one meets the force of the engine order later", 24
+        "number of sectors of the ring; each meets the force of the engine order later than "
+        "the one before",
+        24,
     )
     axis: Literal["x", "y", "z", "-x", "-y", "-z", "turning"] = entry(
-        "about which the next sector is turned, by the right hand, by 360 deg over their number: "
-        "x, y, z, -x, -y or -z; or turning: the axes of points turn with their sector, as radial "
-        "and tangential ones",
+        "axis about which the next sector is turned, right-handed, by 360 deg over their number: "
+        "x, y, z, -x, -y or -z; or turning: the axes of points turn with their sector (radial "
+        "and tangential)",
         "turning",
     )
-    faces: tuple[CutFace, ...] = entry("on which sectors are cut from each other", default=())
+    faces: tuple[CutFace, ...] = entry("faces between which sectors are cut", default=())
 
     @property
     def text(self) -> str:
@@ -67,7 +71,8 @@ class RingOfSectors(Section):
             there = names.of(face.next_points, f"{key}.next_points")
             if len(here) != len(there):
                 raise EntryError(
-                    f"{key}.next_points", f"{len(there)} points for {len(here)}; allowed: as many"
+                    f"{key}.next_points",
+                    f"{len(there)} points for {len(here)}; allowed: as many of both",
                 )
             for point, other in zip(here, there, strict=True):
                 moving = {name.rpartition(" ")[2] for name in names.names_of(point)}

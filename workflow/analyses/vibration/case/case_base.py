@@ -45,12 +45,12 @@ class VibrationCaseBase(Case):
     in_schema: ClassVar[Mapping[str, Any]] = one_of("forces", "excitation")
 
     title: Title = entry("one line", "Forced response of a friction rig")
-    analysis: Literal["vibration"] = entry("what is computed", "vibration")
+    analysis: Literal["vibration"] = entry("kind of analysis", "vibration")
     structure: RowOfMasses | ReducedBody | MatrixBody | PointBody | FrictionRig = entry(
-        "what holds the joints"
+        "structure that holds the joints"
     )
     forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] | None = entry(
-        "amplitudes, ascending, each followed through the frequencies [N]",
+        "amplitudes of the force, ascending, each followed through the frequencies [N]",
         ["10 N", "40 N"],
         default=None,
     )
@@ -59,20 +59,20 @@ class VibrationCaseBase(Case):
         default=None,
     )
     engine_order: Annotated[float, Quantity("1", above=0.0, at_most=1e3)] | None = entry(
-        "frequency over turns per second of an engine: answers are told over its speed too [1]",
+        "frequency over turns per second of an engine: results are also given over its speed [1]",
         4,
         default=None,
     )
     frequencies: tuple[Frequency, Frequency] = entry(
         "lower and upper end [Hz]", ["20 Hz", "400 Hz"]
     )
-    resolution: MotionResolution = entry("of a period", default=MotionResolution())
-    continuation: Continuation = entry("of each curve", default=Continuation())
+    resolution: MotionResolution = entry("resolution of a period", default=MotionResolution())
+    continuation: Continuation = entry("continuation of each curve", default=Continuation())
 
     @model_validator(mode="after")
     def _ascending(self) -> VibrationCaseBase:
         if any(after <= before for before, after in pairwise(self.forces or ())):
-            raise disagreement("not ascending; allowed: each force above the last", "forces")
+            raise disagreement("not ascending; allowed: ascending forces", "forces")
         if self.frequencies[0] >= self.frequencies[1]:
             raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
         return self
@@ -93,18 +93,19 @@ class VibrationCaseBase(Case):
             return self
         if self.forces is not None:
             raise disagreement(
-                "given beside an excitation; allowed: excitation.levels, by which it is multiplied",
+                "given with an excitation; allowed: excitation.levels, by which it is multiplied",
                 *("forces", "excitation"),
             )
         if driven is not None:
             raise disagreement(
-                "given beside an excitation, which names its places; allowed: one of them",
+                "given with an excitation, which names its places; allowed: one of them",
                 *("structure.driven", "excitation"),
             )
         harmonics = excitation.harmonics(self.resolution.harmonics[-1])
         if 1 not in harmonics:
             raise disagreement(
-                "no harmonic 1; allowed: one, frequencies being those of the slowest part",
+                "no harmonic 1; allowed: a harmonic 1, because frequencies are those of the "
+                "slowest part",
                 "excitation",
             )
         if self.resolution.samples <= 2 * max(harmonics):
@@ -230,7 +231,7 @@ class DrivenMass(VibrationCaseBase):
     """A vibration case whose structure may be a row of masses, of which any one is driven."""
 
     mass: MassNumber | None = entry(
-        "of a row, that is driven, counted from the ground; without it the first", 1, default=None
+        "driven mass of a row, counted from the ground; without it the first", 1, default=None
     )
 
     @model_validator(mode="after")
@@ -238,7 +239,7 @@ class DrivenMass(VibrationCaseBase):
         otherwise = f"{self.structure.kind}; allowed: for a rig"
         if self.mass is not None and self.excitation is not None:
             raise disagreement(
-                f"{self.mass}: given beside an excitation, which names its places; allowed: one of "
+                f"{self.mass}: given with an excitation, which names its places; allowed: one of "
                 "them",
                 *("mass", "excitation"),
             )

@@ -57,10 +57,12 @@ class ForceAt(Moved):
     """A force a sin(2π k f t + phase) that points share evenly."""
 
     points: Title = entry(NAMED, "m1")
-    direction: Direction = entry("along which it acts: x, y, z, -x, -y or -z", "x", default="x")
-    amplitude: DrivingForce = entry("at level 1 [N]", "10 N")
-    phase: Phase = entry("at t = 0 [rad]", "90 deg", default=0.0)
-    harmonic: Harmonic = entry("k, of the frequency", 1, default=1)
+    direction: Direction = entry(
+        "direction along which it acts: x, y, z, -x, -y or -z", "x", default="x"
+    )
+    amplitude: DrivingForce = entry("amplitude at level 1 [N]", "10 N")
+    phase: Phase = entry("phase at t = 0 [rad]", "90 deg", default=0.0)
+    harmonic: Harmonic = entry("harmonic k of the frequency", 1, default=1)
 
     @property
     def wave(self) -> complex:
@@ -72,14 +74,16 @@ class RecordAt(Moved):
     """A force that is recorded over one period."""
 
     points: Title = entry(NAMED, "m1")
-    direction: Direction = entry("along which it acts: x, y, z, -x, -y or -z", "x", default="x")
+    direction: Direction = entry(
+        "direction along which it acts: x, y, z, -x, -y or -z", "x", default="x"
+    )
     file: Annotated[str, File((".csv",))] = entry(
-        "columns time or phase, and force, of one period at level 1; straight between rows, the "
-        "last force the first one again",
+        "file with columns time or phase, and force, of one period at level 1; straight between "
+        "rows, the last force equal to the first",
         "period.csv",
     )
     highest: Harmonic | None = entry(
-        "harmonic that is taken of it; without it the highest of resolution.harmonics",
+        "highest harmonic used; without it the highest of resolution.harmonics",
         15,
         default=None,
     )
@@ -123,8 +127,8 @@ class GroundMotion(Section):
 
     kind: str  # named first; each narrows it to its own name
     direction: Literal["x", "y", "z"] = entry("x, y or z", "x", default="x")
-    phase: Phase = entry("at t = 0 [rad]", "0 deg", default=0.0)
-    harmonic: Harmonic = entry("k, of the frequency", 1, default=1)
+    phase: Phase = entry("phase at t = 0 [rad]", "0 deg", default=0.0)
+    harmonic: Harmonic = entry("harmonic k of the frequency", 1, default=1)
 
 
 class GroundDisplacement(GroundMotion):
@@ -132,7 +136,7 @@ class GroundDisplacement(GroundMotion):
 
     kind: Literal["displacement"] = entry("displacement or acceleration", "displacement")
     amplitude: Annotated[float, Quantity("mm", above=0.0, at_most=1e3)] = entry(
-        "at level 1 [mm]", "10 um"
+        "amplitude at level 1 [mm]", "10 um"
     )
 
 
@@ -141,7 +145,7 @@ class GroundAcceleration(GroundMotion):
 
     kind: Literal["acceleration"] = entry("a given acceleration", "acceleration")
     amplitude: Annotated[float, Quantity("mm/s^2", above=0.0, at_most=1e9)] = entry(
-        "at level 1 [mm/s^2]", "5 m/s^2"
+        "amplitude at level 1 [mm/s^2]", "5 m/s^2"
     )
 
 
@@ -151,12 +155,12 @@ class VibrationExcitation(Section):
     also_filled_in: ClassVar[tuple[str, ...]] = ("forces",)
 
     levels: Annotated[tuple[Level, ...], Field(min_length=1, max_length=100)] = entry(
-        "by which all of it is multiplied, ascending, each followed through the frequencies [1]",
+        "factors of the whole excitation, ascending, each followed through the frequencies [1]",
         [1, 4],
         default=(1.0,),
     )
-    forces: tuple[ForceAt, ...] = entry("sines at places", default=())
-    records: tuple[RecordAt, ...] = entry("forces of a recorded period", default=())
+    forces: tuple[ForceAt, ...] = entry("sinusoidal forces at places", default=())
+    records: tuple[RecordAt, ...] = entry("recorded forces of one period", default=())
     base: tuple[
         Annotated[GroundDisplacement | GroundAcceleration, Field(discriminator="kind")], ...
     ] = entry("motion of the ground, to which displacements are then relative", default=())
@@ -166,7 +170,7 @@ class VibrationExcitation(Section):
         if not (self.forces or self.records or self.base):
             raise disagreement("nothing drives; allowed: forces, records or base", "forces")
         if any(after <= before for before, after in pairwise(self.levels)):
-            raise disagreement("not ascending; allowed: each level above the last", "levels")
+            raise disagreement("not ascending; allowed: ascending levels", "levels")
         return self
 
     @property

@@ -57,15 +57,14 @@ def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> 
         if not rig.translations:
             raise EntryError(
                 f"excitation.base.{number}",
-                "the reduced body is held inside, and does not move "
-                "with the ground as a whole; allowed: a body reduced with what holds it among its "
-                "kept points, or forces",
+                "the reduced body is held inside and does not move with the ground as a whole; "
+                "allowed: a body reduced with the points that hold it, or forces",
             )
         if motion.direction not in rig.translations:
             raise EntryError(
                 f"excitation.base.{number}.direction",
-                f"{motion.direction}: the structure does not "
-                f"move so; allowed: {', '.join(rig.translations)}",
+                f"{motion.direction}: the structure does not move in this direction; allowed: "
+                f"{', '.join(rig.translations)}",
             )
         along = rig.translations[motion.direction]
         wave = complex(-1j * motion.amplitude * np.exp(1j * motion.phase))
@@ -78,8 +77,8 @@ def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> 
     if not excitation.base and float(np.linalg.norm(waves[1])) <= CANCELLED * parts:
         raise EntryError(
             "excitation",
-            "the parts of harmonic 1 cancel each other, and nothing drives at the "
-            "frequency; allowed: parts that leave something of each other",
+            "the parts of harmonic 1 cancel, so nothing drives at the frequency; allowed: parts "
+            "that do not cancel",
         )
     load = PeriodicLoad(dict(waves), inertial=dict(inertial))
     return Driving(load, tuple(ground), LEVEL, tuple(excitation.left_out(highest)))

@@ -27,7 +27,7 @@ class HarmonicNumbers(Entry):
     @property
     def allowed(self) -> str:
         return (
-            f"how many odd harmonics, 1 to {MOST_ODD}, or harmonics from 0 to {HIGHEST}, "
+            f"number of odd harmonics, 1 to {MOST_ODD}, or harmonics from 0 to {HIGHEST}, "
             "ascending, 1 among them, such as [1, 3, 5]"
         )
 
@@ -36,7 +36,7 @@ class HarmonicNumbers(Entry):
             if not all(type(number) is int and 0 <= number <= HIGHEST for number in value):
                 raise self.refusal(value, "not all of them harmonics")
             if any(after <= before for before, after in pairwise(value)):
-                raise self.refusal(value, "not ascending, each once")
+                raise self.refusal(value, "not ascending, or repeated")
             if 1 not in value:
                 raise self.refusal(value, "without harmonic 1")
             return tuple(value)
@@ -56,16 +56,19 @@ class MotionResolution(Section):
     """Harmonics of the motion, and samples per period for the joint force."""
 
     harmonics: Annotated[Sequence[int], HarmonicNumbers()] = entry(
-        "how many odd ones, or a list; those to begin with if there is a tolerance; for contacts "
-        "and what else moves the mean, 0 is added",
+        "number of odd harmonics, or a list; the first ones if there is a tolerance; where the "
+        "mean can move, as in contacts, 0 is added",
         8,
         default=ODD,
     )
     samples: Annotated[int, Whole(8, 65536)] = entry(
-        "of a period, more than two for each period of the highest harmonic", 256, default=256
+        "samples of a period, more than two for each period of the highest harmonic",
+        256,
+        default=256,
     )
     tolerance: Annotated[float, Quantity("1", at_least=1e-8, at_most=0.1)] | None = entry(
-        "of the joint's vibration, to which harmonics and samples grow; without it they stay [1]",
+        "tolerance of the joint's vibration, for which harmonics and samples are raised; "
+        "without it they stay [1]",
         "1 %",
         default=None,
     )
@@ -76,7 +79,7 @@ class MotionResolution(Section):
         if self.samples <= 2 * highest:
             raise disagreement(
                 f"{self.samples}: too few for harmonic {highest}; allowed: above {2 * highest}, "
-                "better ten times as many as the harmonic",
+                "better ten times the harmonic",
                 *("samples", "harmonics"),
             )
         return self
@@ -85,21 +88,27 @@ class MotionResolution(Section):
 class Continuation(Section):
     """Continuation of a curve of motions; steps are shares of the motion and of the frequency."""
 
-    first_step: Step = entry("with which a curve begins [1]", 0.02, default=0.02)
-    shortest_step: Step = entry("at which the curve is given up [1]", 1e-6, default=1e-6)
-    longest_step: Step = entry("shorter ones draw a smoother curve [1]", 0.1, default=0.1)
+    first_step: Step = entry("first step of a curve [1]", 0.02, default=0.02)
+    shortest_step: Step = entry("step below which the curve ends [1]", 1e-6, default=1e-6)
+    longest_step: Step = entry(
+        "largest step; shorter ones draw a smoother curve [1]", 0.1, default=0.1
+    )
     iterations: Annotated[int, Whole(1, 50)] = entry(
-        "of Newton's method that are wanted in a step: with more it shrinks", 4, default=4
+        "iterations of Newton's method per step that are aimed at: with more the step shrinks",
+        4,
+        default=4,
     )
     most_iterations: Annotated[int, Whole(1, 100)] = entry(
-        "after which a step is halved", 8, default=8
+        "iterations after which a step is halved", 8, default=8
     )
     largest_angle: Annotated[
         float, Quantity("rad", above=0.0, at_most=1.6, range_text="above 0 to 90 deg")
-    ] = entry("by which the curve may turn in a step [rad]", "30 deg", default=radians(30.0))
-    most_points: Annotated[int, Whole(2, 1_000_000)] = entry("of one curve", 2000, default=2000)
+    ] = entry("angle by which the curve may turn in a step [rad]", "30 deg", default=radians(30.0))
+    most_points: Annotated[int, Whole(2, 1_000_000)] = entry(
+        "number of points of one curve", 2000, default=2000
+    )
     tolerance: Annotated[float, Quantity("1", at_least=1e-13, at_most=1e-3)] = entry(
-        "of the balance of forces at every point [1]", 1e-10, default=1e-10
+        "tolerance of the balance of forces at every point [1]", 1e-10, default=1e-10
     )
     start: Literal["lower", "upper"] = entry(
         "end of the frequencies from which the curve is followed, lower or upper",
@@ -121,17 +130,17 @@ class Continuation(Section):
 class LoopsAt(Section):
     """Loops of the joints at one frequency, under each force."""
 
-    frequency: Frequency = entry("of the force [Hz]", "100 Hz")
+    frequency: Frequency = entry("frequency of the force [Hz]", "100 Hz")
     harmonics: Annotated[
         tuple[Annotated[Sequence[int], HarmonicNumbers()], ...], Field(max_length=10)
     ] = entry(
-        "resolutions in which each loop is found, the finest last, such as [5, 15] odd harmonics; "
-        "none: that of the motion",
+        "resolutions with which each loop is computed, the finest last, such as [5, 15] odd "
+        "harmonics; none: that of the motion",
         [5, 15],
         default=(),
     )
     joints: Annotated[int, Whole(1, 1000)] | None = entry(
-        "of which entry of structure.joints, counted from 1; without it of all together, if they "
+        "entry of structure.joints, counted from 1; without it all of them together, if they "
         "have one law",
         1,
         default=None,
@@ -148,8 +157,7 @@ class LoopsAt(Section):
     def _finer_and_finer(self) -> LoopsAt:
         if any(after[-1] <= before[-1] for before, after in pairwise(self.harmonics)):
             raise disagreement(
-                "not finer and finer; allowed: each with a higher last harmonic than the one "
-                "before",
+                "not increasing; allowed: each with a higher last harmonic than the one before",
                 "harmonics",
             )
         return self
@@ -159,16 +167,20 @@ class NonlinearModes(Section):
     """Modes with joints, over their amplitude: no force or phase has to be chosen."""
 
     numbers: Annotated[tuple[Annotated[int, Whole(1, 1000)], ...], Field(min_length=1)] = entry(
-        "of the modes with joints as stiff as at rest, from the lowest, 1, on", [1], default=(1,)
+        "numbers of the modes with joints as stiff as at rest, from the lowest, 1, on",
+        [1],
+        default=(1,),
     )
     amplitudes: tuple[Amplitude, Amplitude] = entry(
-        "least and largest, of what is looked at [mm]", ["0.1 um", "20 um"]
+        "smallest and largest amplitude of the reported point [mm]", ["0.1 um", "20 um"]
     )
 
     @model_validator(mode="after")
     def _ascends(self) -> NonlinearModes:
         if self.amplitudes[0] >= self.amplitudes[1]:
-            raise disagreement("not ascending; allowed: the least, then the largest", "amplitudes")
+            raise disagreement(
+                "not ascending; allowed: the smallest, then the largest", "amplitudes"
+            )
         if len(set(self.numbers)) < len(self.numbers):
             raise disagreement("a mode twice; allowed: each once", "numbers")
         return self
@@ -185,7 +197,7 @@ class FurtherStart(Section):
     """A start of the search for a branch not reached from an end of the frequencies."""
 
     force: DrivingForce = entry("one of forces, or of the excitation's levels [N]", "40 N")
-    frequency: Frequency = entry("of motions that may be on it [Hz]", "200 Hz")
+    frequency: Frequency = entry("frequency of motions that may be on the branch [Hz]", "200 Hz")
     amplitude: Annotated[float, Quantity("mm", above=0.0, at_most=1e3)] = entry(
-        "of what is looked at in such a motion, roughly [mm]", "50 um"
+        "rough amplitude of the reported point in such a motion [mm]", "50 um"
     )

@@ -46,52 +46,52 @@ class VibrationCase(DrivenMass):
 
     structure: Annotated[
         Rig | ReducedBody | MatrixBody | PointBody | FrictionRig, Field(discriminator="kind")
-    ] = entry("what holds the joints")
+    ] = entry("structure that holds the joints")
     joint: VibrationLaw | None = entry(
-        "its law and its parameters; of all joints together that have none of their own in "
-        "structure.joints, of those of one sector of a ring",
+        "law and parameters of the joint; of all joints together that have none of their own in "
+        "structure.joints, in a ring of one sector",
         default=None,
     )
     ring: RingOfSectors | None = entry(
-        "of like sectors, of which the structure is one: a wave of the engine order travels round",
+        "ring of equal sectors, of which the structure is one: a wave of the engine order "
+        "travels round",
         default=None,
     )
-    loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
+    loops: LoopsAt | None = entry("loops of all joints together, at one frequency", default=None)
     force_sweeps: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
-        "frequencies at which motions are followed along the force, from the least to the largest "
-        "[Hz]",
+        "frequencies at which motions are followed from the smallest to the largest force [Hz]",
         ["100 Hz"],
         default=(),
     )
     at: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
-        "frequencies at which every motion under each force is solved for [Hz]",
+        "frequencies at which every motion under each force is computed [Hz]",
         ["100 Hz", "150 Hz"],
         default=(),
     )
     harmonics_along_curves: StrictBool = entry(
-        "whether the harmonics of every point of the curves are written too, which may be large; "
-        "those at resonance, and of the motions that are solved for, always are",
+        "whether to write the harmonics of every point of the curves, which may be large; those "
+        "at resonance and of the computed motions are always written",
         False,
         default=False,
     )
     backbone: StrictBool = entry(
-        "whether phase resonance, what is driven 90 degrees behind the force, is followed too",
+        "whether to follow phase resonance, at which the driven point lags the force by 90 degrees",
         False,
         default=False,
     )
     modes: NonlinearModes | None = entry(
-        "whose frequency and damping are followed over the amplitude", default=None
+        "modes whose frequency and damping are followed over the amplitude", default=None
     )
 
     further_branches: Annotated[tuple[FurtherStart, ...], Field(max_length=100)] = entry(
-        "from where branches are looked for that no end of the frequencies leads to, as closed "
-        "ones; none: nowhere",
+        "starts of the search for branches that no end of the frequencies leads to, such as "
+        "closed ones; none: no search",
         default=(),
     )
     stability: Literal["auto", "every", "none"] = entry(
-        "of which motions it is found, and where it changes; auto: of every one in structures of "
-        "up to 64 modes and 12 directions of joints, in all sectors of a ring together, as with "
-        "more one may take a second",
+        "motions whose stability is computed; auto: every one in structures of up to 64 modes "
+        "and 12 directions of joints (in a ring, of all sectors together), because one may take "
+        "a second in larger ones",
         "every",
         default="auto",
     )
@@ -107,7 +107,7 @@ class VibrationCase(DrivenMass):
             )
         if self.joint is not None and None not in own:
             raise disagreement(
-                f"{self.joint.law}: given, but every entry of joints has a law of its own; "
+                f"{self.joint.law}: not used, because every entry of joints has a law of its own; "
                 "allowed: without it",
                 "joint",
             )
@@ -151,8 +151,8 @@ class VibrationCase(DrivenMass):
         uneven = [law for law in self.laws if isinstance(law, ElasticJoint) and law.moves_mean]
         if uneven and not any(number % 2 == 0 for number in self.harmonics if number > 0):
             yield (
-                f"resolution.harmonics: without even ones, which a joint of law {uneven[0].law} "
-                "that is not alike on both sides has; list them, such as [0, 1, 2, 3, 4, 5]"
+                f"resolution.harmonics: no even ones, but a joint of law {uneven[0].law} differs "
+                "on its two sides and needs them; list them, such as [0, 1, 2, 3, 4, 5]"
             )
 
     @model_validator(mode="after")
@@ -165,8 +165,8 @@ class VibrationCase(DrivenMass):
             )
         if self.backbone and self.excitation is not None and self.excitation.moves_by_a_way:
             raise disagreement(
-                "true: with a displacement of the ground, whose forces change with the frequency; "
-                "allowed: a kind of base that is acceleration",
+                "true: with a displacement of the ground, whose forces change with the "
+                "frequency; allowed: base.kind: acceleration",
                 *("backbone", "excitation"),
             )
         return self
@@ -200,7 +200,7 @@ class VibrationCase(DrivenMass):
             )
         if self.excitation is not None and self.excitation.base:
             raise disagreement(
-                "a ground that moves drives all sectors at once, not as an engine order does; "
+                "a moving ground drives all sectors at once, not as an engine order does; "
                 "allowed: forces and records",
                 *("excitation.base", "ring"),
             )
@@ -229,8 +229,8 @@ class VibrationCase(DrivenMass):
     def _has_the_directions(self) -> VibrationCase:
         if isinstance(self.joint, FrictionContactJoint) and isinstance(self.structure, Rig):
             raise disagreement(
-                "friction_contact: has three directions; allowed: in a reduced structure or a "
-                "friction_rig, or jenkins, which it is along one",
+                "friction_contact has three directions; allowed: in a reduced structure or a "
+                "friction_rig, or jenkins, which has one",
                 "joint.law",
             )
         if isinstance(self.structure, FrictionRig):
@@ -246,8 +246,7 @@ class VibrationCase(DrivenMass):
             )
         if joint.gap > 0.0:
             raise disagreement(
-                f"{joint.gap:g} mm: given beside specimens; allowed: their own form, "
-                "structure.form of their case",
+                f"{joint.gap:g} mm: given with specimens; allowed: structure.form of their case",
                 "joint.gap",
             )
         if joint.normal_load == 0.0:
@@ -271,7 +270,7 @@ class VibrationCase(DrivenMass):
                     key,
                 )
         if any(after <= before for before, after in pairwise(self.at)):
-            raise disagreement("not ascending; allowed: each frequency above the last", "at")
+            raise disagreement("not ascending; allowed: ascending frequencies", "at")
         return self
 
     @model_validator(mode="after")
@@ -306,7 +305,7 @@ class VibrationCase(DrivenMass):
         number, own = self.loops.joints, self.own_laws
         if number is None and any(own) and len(own) > 1:
             raise disagreement(
-                "missing: joints of laws of their own have no loop together; allowed: the number "
+                "missing: joints with laws of their own have no common loop; allowed: the number "
                 f"of an entry of structure.joints, 1 to {len(own)}",
                 "loops.joints",
                 "loops",

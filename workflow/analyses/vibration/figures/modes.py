@@ -57,6 +57,6 @@ def _title(file: h5py.File, contents: VibrationContents) -> str:
     first = file[MODES][contents.modes[0]].attrs
     begin, end = first["frequency"]
     return (
-        f"Mode {first['mode']}: {begin:.4g} Hz at the least amplitude, {end:.4g} at the largest, "
-        f"damped by up to {TO_PERCENT * first['most_damped']:.3g} %"
+        f"Mode {first['mode']}: {begin:.4g} Hz at the smallest amplitude, {end:.4g} at the "
+        f"largest, damping up to {TO_PERCENT * first['most_damped']:.3g} %"
     )

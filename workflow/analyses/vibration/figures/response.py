@@ -246,6 +246,6 @@ def _resonance_title(file: h5py.File) -> str:
     resonances = [float(peak["resonance"]) for peak in peaks]
     most = max(peaks, key=lambda peak: float(peak["damping"]))
     return (
-        f"Resonance between {min(resonances):.4g} and {max(resonances):.4g} Hz; most damped "
+        f"Resonance between {min(resonances):.4g} and {max(resonances):.4g} Hz; highest damping "
         f"{under_in(most)}: {TO_PERCENT * most['damping']:.3g} %"
     )

@@ -30,7 +30,7 @@ from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, ORANGE
 MOST_FORCES, MOST_JOINTS = 3, 6
 TO_PERCENT = 1e2
 # States of a joint that fill the period, from the bottom of its panel.
-DOES = {"sticks, or is pressed": BLUE, "slips": ORANGE, "is apart": "#B8B8B8"}
+DOES = {"sticks or is closed": BLUE, "slips": ORANGE, "is open": "#B8B8B8"}
 # Heights of the response, of the panels below it, and of the margins [inch].
 RESPONSE, STRIP, MAP, AROUND = 2.2, 1.5, 2.6, 1.6
 
@@ -204,7 +204,7 @@ def _label(panels: Any, response: h5py.Group) -> None:
 def _most_slipping(shown: list[h5py.Group], names: list[str]) -> str:
     """Return text on the joint that slips longest, or is apart longest where none slips."""
     response = shown[-1]
-    for word, name in (("slips", "slip"), ("is apart", "separated")):
+    for word, name in (("slips", "slip"), ("is open", "separated")):
         shares = response[f"nodes/{name}"][()]
         if shares.any():
             _, joint = np.unravel_index(shares.argmax(), shares.shape)
@@ -212,13 +212,13 @@ def _most_slipping(shown: list[h5py.Group], names: list[str]) -> str:
             return (
                 f"{names[joint]} {word} up to {most:.0f} % of the period {under_in(response.attrs)}"
             )
-    return f"Nothing slips or parts {under_in(response.attrs)}"
+    return f"No joint slips or opens {under_in(response.attrs)}"
 
 
 def _most_at_once(shown: list[h5py.Group]) -> str:
     """Return text on the most joints that slip, and are apart, at some time of a cycle."""
     texts = []
-    for name, word in (("slip", "slip"), ("separated", "are apart")):
+    for name, word in (("slip", "slip"), ("separated", "are open")):
         shares = shown[-1][f"nodes/{name}"][()]
         texts.append(f"{(shares > 0.0).sum(axis=1).max()} {word}")
     count = shares.shape[1]

@@ -19,10 +19,10 @@ WORDS = {0: "stability unknown", -1: "unstable"}
 # Marks of bifurcations, with their names.
 MARKS = {
     "fold": ("s", "fold"),
-    "branching": ("^", "another branch leaves"),
-    "period_doubling": ("D", "period doubles"),
+    "branching": ("^", "branch point"),
+    "period_doubling": ("D", "period doubling"),
     "neimark_sacker": ("*", "second frequency (Neimark-Sacker)"),
-    "jump": ("X", "joints change it at once"),
+    "jump": ("X", "joints change it abruptly"),
 }
 MARK: dict[str, Any] = {"markersize": 6, "linestyle": "none", "zorder": 5}
 

@@ -26,8 +26,8 @@ KINDS = {
     "sticks": BLUE,
     "slips, up to half of the cycle": "#F0E442",
     "slips longer": ORANGE,
-    "lifts off for a part": "#8A8A8A",
-    "open all the time": "#E3E3E3",
+    "lifts off for part of the cycle": "#8A8A8A",
+    "always open": "#E3E3E3",
 }
 STICKS, SLIPS_BRIEFLY, SLIPS_LONG, LIFTS_OFF, OPEN = range(len(KINDS))
 CELLS: dict[str, Any] = {

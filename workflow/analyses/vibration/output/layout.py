@@ -23,7 +23,7 @@ from workflow.models.vibration.motions import COLUMNS, SLIPS
 from workflow.models.vibration.results import linear_limits
 
 CONVENTION = "x(t) = sum of Re(c_k exp(i k 2 pi f t)), forces being sines at t = 0"
-LOOKED_AT = "half of the way to and fro of what is looked at"
+LOOKED_AT = "half the peak-to-peak motion of the reported point"
 
 
 def layout_of(amount: ExcitationSize) -> Layout:
@@ -53,7 +53,7 @@ def layout_of(amount: ExcitationSize) -> Layout:
                 **over("place", places=("1", "whose displacements have harmonics")),
                 **over(
                     "joint direction",
-                    joints=("1", "of every direction of every joint: what it stretches by"),
+                    joints=("1", "stretch of every direction of every joint"),
                 ),
             },
             DIAMETERS: {
@@ -68,8 +68,8 @@ def layout_of(amount: ExcitationSize) -> Layout:
                 "joint",
                 x=("mm", "of each joint on the contact plane"),
                 y=("mm", "of each joint on the contact plane"),
-                gap=("mm", "of the bodies without load"),
-                area=("mm^2", "that belongs to each joint"),
+                gap=("mm", "gap of the bodies without load"),
+                area=("mm^2", "area that belongs to each joint"),
                 normal_force=("N", "of each joint at rest"),
                 normal_displacement=("mm", "closing of each joint by the load at rest"),
             ),
@@ -79,12 +79,13 @@ def layout_of(amount: ExcitationSize) -> Layout:
             f"{response}/{LOOPS}/<loop>": over(
                 "point",
                 displacement=("mm", "between the targets, or the mean of the joints, in a cycle"),
-                force=("N", "of all joints together along it"),
-                expansion=("N", "the same in the harmonics of the motion alone"),
+                force=("N", "force of all joints together along it"),
+                expansion=("N", "the same force in the harmonics of the motion alone"),
             ),
             f"{response}/{AT}": {
                 **over(
-                    "motion", frequency=("Hz", "of the force; motions in the order of the curve")
+                    "motion",
+                    frequency=("Hz", "frequency of the force; motions in the order of the curve"),
                 ),
                 "amplitude": branch["amplitude"]._replace(dims=("motion", "seen")),
                 "absolute_amplitude": branch["absolute_amplitude"]._replace(
@@ -95,7 +96,7 @@ def layout_of(amount: ExcitationSize) -> Layout:
                     "motion",
                     error=(
                         "1",
-                        "estimated error of vibration or energy lost, by harmonics and samples",
+                        "estimated error of vibration or energy lost, due to harmonics and samples",
                     ),
                 ),
             },
@@ -114,7 +115,7 @@ def layout_of(amount: ExcitationSize) -> Layout:
                     amount.name,
                     frequency=(
                         "Hz",
-                        "of phase resonance: what is driven lags the force by 90 degrees",
+                        "phase resonance: the driven point lags the force by 90 degrees",
                     ),
                     amplitude=("mm", LOOKED_AT),
                 ),
@@ -152,13 +153,13 @@ def _motions(dim: str) -> Declarations:
 
 
 def _stability(dim: str) -> Declarations:
-    of, unknown = "of a small deviation in a period", "NaN where it is not known"
+    of, unknown = "of a small deviation in a period", "NaN where unknown"
     return over(
         dim,
         stability=("1", "1 stable, -1 unstable, 0 unknown"),
         multiplier=("1", f"size of the largest multiplier {of}, {unknown}"),
-        multiplier_error=("1", f"estimated, of the largest multiplier, {unknown}"),
-        unstable_multipliers=("1", f"multipliers {of} beyond 1, surely"),
+        multiplier_error=("1", f"estimated error of the largest multiplier, {unknown}"),
+        unstable_multipliers=("1", f"number of multipliers {of} certainly beyond 1"),
     )
 
 
@@ -173,7 +174,10 @@ def bifurcation_columns(amount: ExcitationSize) -> Declarations:
             amplitude=("mm", LOOKED_AT),
             multiplier=("1", "size of the one that passes the circle there"),
             multiplier_angle=("rad", "its angle: 0 of a fold, pi where the period doubles"),
-            unstable_before=("1", "multipliers beyond the circle before, NaN where not known"),
+            unstable_before=(
+                "1",
+                "number of multipliers beyond the circle before, NaN where unknown",
+            ),
             unstable_after=("1", "and at the point after"),
         ),
     }
@@ -201,7 +205,7 @@ _SHARE = "share of the cycle in which each joint"
 _NODES = over(
     "point joint",
     slip=("1", f"{_SHARE} slips, by point of the curve"),
-    separated=("1", f"{_SHARE} is apart"),
+    separated=("1", f"{_SHARE} is open"),
     energy=("N mm", "energy that each joint dissipates in a cycle"),
 )
 _CYCLE = {
@@ -210,16 +214,16 @@ _CYCLE = {
         displacement=("mm", "of each joint along x, y and its closing, at times of a cycle"),
         force=("N", "of each joint along x, y and its pressure"),
     ),
-    **over("sample joint", state=("1", "of each joint: 0 sticks, 1 slips, 2 is apart")),
+    **over("sample joint", state=("1", "state of each joint: 0 sticks, 1 slips, 2 is open")),
 }
-_RICHER = "estimated error by harmonics and samples"
+_RICHER = "estimated error due to harmonics and samples"
 _ALONG_MODE = "modal_amplitude"
 _MODE = over(
     _ALONG_MODE,
     amplitude=("mm", f"{LOOKED_AT}, in the order of the curve"),
     modal_amplitude=("t^0.5 mm", "amplitude of the mode: norm of harmonic 1 by the mass"),
     frequency=("Hz", "of the mode"),
-    damping=("1", "of the mode, as a share of what is critical: energy lost over 2ω ∫ x'ᵀ M x' dt"),
+    damping=("1", "damping ratio of the mode: energy lost over 2ω ∫ x'ᵀ M x' dt"),
     energy_per_cycle=("N mm", "energy that the joints dissipate in a cycle"),
     slip=("1", SLIPS),
     frequency_error=("1", _RICHER),

@@ -15,7 +15,7 @@ from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, told
 
 LINEAR, RECORDS = "linear limits", "left_out_of_records"
-ERROR = "joints' vibration or energy lost, by harmonics and samples"
+ERROR = "joints' vibration or energy lost, due to harmonics and samples"
 # Quantities of the motion at resonance: unit, text, everyday unit.
 NUMBERS = {
     "resonance": ("Hz", "resonance", ""),
@@ -43,7 +43,7 @@ BESIDE = {
 ANSWER = {
     "amplitude": ("mm", "amplitude", ""),
     "absolute_amplitude": ("mm", "absolute amplitude", ""),
-    "phase": ("rad", "phase before the force", "deg"),
+    "phase": ("rad", "phase by which the motion leads the force", "deg"),
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
 }
 LOOP_WITH_ERROR = "energy", "stroke"
@@ -74,7 +74,10 @@ def main_results(case: VibrationCase, summary: Summary) -> list[SummaryQuantity]
     )
     records = (
         SummaryQuantity(
-            "excitation", f"left out of record {number + 1}", f"{RECORDS}.{number}", "1"
+            "excitation",
+            f"share of record {number + 1} that is not used",
+            f"{RECORDS}.{number}",
+            "1",
         )
         for number in range(len(summary.get(RECORDS, ())))
     )

@@ -31,6 +31,7 @@ from workflow.analyses.vibration.output.outcome import (
 )
 from workflow.analyses.vibration.stability import bifurcation_arrays
 from workflow.case.text.plain import counted
+from workflow.case.text.readable import percent
 from workflow.layout.declared import Layout
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.shell.analysis import Run
@@ -181,9 +182,9 @@ def _write_responses(outcome: VibrationOutcome, folder: OutputFolder, layout: La
             path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
             write_curves(path, response.loops[-1].arrays, layout.datasets(f"{place}/{LOOPS}/-"))
         if response.answers is not None:
-            path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as asked for")
+            path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as requested")
             write_curves(path, response.answers.arrays, layout.datasets(f"{place}/{AT}"))
-        what = f"harmonics of places and joints {under}, at resonance and as asked for"
+        what = f"harmonics of places and joints {under}, at resonance and as requested"
         path = folder.reserve(f"harmonics_{number:05d}.csv", what)
         write_harmonics(path, outcome.names, response)
 
@@ -268,8 +269,8 @@ def _response_line(case: VibrationCase, response: Response, label: str) -> str:
     parts = [
         f"{case.amount.told(response.force)}: resonance {numbers['resonance']:.5g} Hz",
         f"{label} moves {TO_MICRONS * numbers['amplitude']:.4g} um{_beside(numbers)}",
-        f"damping {numbers['damping']:.2%}",
-        f"slips {numbers['slip']:.0%} of the cycle",
+        f"damping {percent(numbers['damping'])}",
+        f"slips {percent(numbers['slip'])} of the cycle",
         f"{numbers['points']} points",
         f"error {numbers['error']:.1e}",
     ]
@@ -322,7 +323,7 @@ def _further_line(amount: ExcitationSize, branch: Curves) -> str:
     if numbers["closed"]:
         ends = ", closed"
     else:
-        ends = ", which comes out on a known one" if numbers["joins"] else ""
+        ends = ", which leads to a known one" if numbers["joins"] else ""
     return (
         f"{amount.told(numbers[amount.name])}: a further branch from "
         f"{numbers['lowest_frequency']:.5g} to {numbers['highest_frequency']:.5g} Hz{ends}, "
@@ -347,6 +348,6 @@ def _mode_line(mode: Curves) -> str:
     first, last = numbers["frequency"]
     return (
         f"mode {numbers['mode']}: {first:.5g} Hz at {TO_MICRONS * least:.3g} um, {last:.5g} Hz at "
-        f"{TO_MICRONS * largest:.3g} um, damping up to {numbers['most_damped']:.2%}, "
+        f"{TO_MICRONS * largest:.3g} um, damping up to {percent(numbers['most_damped'])}, "
         f"error {numbers['error']:.1e}"
     )

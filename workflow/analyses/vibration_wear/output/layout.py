@@ -86,7 +86,7 @@ def _worn(dims: str) -> Declarations:
 _OVER_CYCLES, _OF_FORCES = "cycles", "cycles excitation"
 _ON_PLANE = "of each node on the contact plane, from the middle of all"
 _PLACES = {
-    **over("node", area=("mm^2", "that belongs to each node")),
+    **over("node", area=("mm^2", "area that belongs to each node")),
     **over("node axis", normal=("1", "out of body 1, what the joints' points meet")),
     **over("node axis", **{POSITION: ("mm", "of each node, x, y, z")}),
     **over(

@@ -103,7 +103,7 @@ def begin_probe_runs(
 
     def reported(probed: Probed, shares: Array) -> ProbeErrors:
         for part, failure in probed.failures.items():
-            reporter.log(f"error budget: {part} unknown, a probe run failed: {failure}")
+            reporter.log(f"error budget: {part} unknown, because a probe run failed: {failure}")
         if "coupling" not in probed.errors:
             return probed.errors
         lag, never = late(probed.rate, shares), probed.errors["coupling"]

@@ -10,6 +10,7 @@ import numpy as np
 from sa_solver.types import Array
 from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.output.layout import PARTS, RESULTS
+from workflow.case.text.readable import percent
 
 Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
 
@@ -44,17 +45,17 @@ def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
     """
     if not errors:
         return
-    listed = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in errors.items())
+    listed = ", ".join(f"{RESULTS[name]} {percent(error.total)}" for name, error in errors.items())
     yield f"estimated errors: {listed}"
     worst = max(errors, key=lambda name: errors[name].total)
     error = errors[worst]
     parts = [
-        f"{name} {part:{'+' if name in error.signed else ''}.1%}"
+        f"{name} {'+' * (name in error.signed and part > 0.0)}{percent(part)}"
         for name, part in error.largest[:MOST_PARTS]
         if part and abs(part) >= WORTH_REPORTING * error.total
     ]
     unknown = dict.fromkeys(name for error in errors.values() for name in error.unknown)
-    largest = f"most of {RESULTS[worst]}: {', '.join(parts)}" if parts else ""
+    largest = f"largest parts for {RESULTS[worst]}: {', '.join(parts)}" if parts else ""
     missing = f"unknown: {', '.join(unknown)}" if unknown else ""
     if largest or missing:
         yield "; ".join(filter(None, (largest, missing)))
@@ -75,9 +76,9 @@ def warning_of(
         for part in PARTS
     }
     most = max(shares, key=shares.__getitem__)
-    listed = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in beyond.items())
+    listed = ", ".join(f"{RESULTS[name]} {percent(error.total)}" for name, error in beyond.items())
     asked = f"{100.0 * accuracy:g} % ({AT_EDGES:g} times that at worn edges)"
     return (
-        f"{name}: estimated errors beyond the accuracy of {asked}: {listed}; mostly by {most}: "
-        f"{settings[most]}"
+        f"{name}: estimated errors exceed the accuracy of {asked}: {listed}; mainly due to "
+        f"{most}: {settings[most]}"
     )

@@ -42,7 +42,7 @@ def check_interface_name(name: str, key: str) -> None:
     """Refuse, at ``key``, an interface whose name cannot be used in the results."""
     if name in RESERVED or "/" in name:
         raise disagreement(
-            f"an interface called {shown(name)}; allowed: names without / and none of "
+            f"an interface called {shown(name)}; allowed: names without /, other than "
             f"{', '.join(RESERVED)}",
             key,
         )
@@ -76,8 +76,8 @@ class WearCase(WithScans, Case):
     half_spaces: ClassVar[bool] = False
 
     title: Title = entry("one line", "Ti-6Al-4V dovetail, one mission per cycle")
-    analysis: Literal["wear"] = entry("what is computed", "wear")
-    structure: Section = entry("what is loaded")
+    analysis: Literal["wear"] = entry("kind of analysis", "wear")
+    structure: Section = entry("loaded structure")
     materials: Section = entry("the two bodies in contact")
     friction: EvolvingFriction = entry("Coulomb's law on every contact face")
     contact: ContactSection = entry(
@@ -85,18 +85,20 @@ class WearCase(WithScans, Case):
     )
     wear: BodiesThatWear = entry("law, length of the run and step")
     loops: Loops = entry(
-        "tangential loops on the worn contacts, where amplitude or force is given", default=Loops()
+        "tangential loops on the worn contacts, if amplitude or force is given", default=Loops()
     )
-    stress: ContactStress = entry("under the contacts, unworn and worn", default=ContactStress())
+    stress: ContactStress = entry(
+        "stress under the contacts, unworn and worn", default=ContactStress()
+    )
     accuracy: Ratio = entry(
-        "of the main results: a run warns of those that it estimates to be farther off, and of "
-        "pressure and fretting parameter at worn edges by five times as much [1]",
+        "accuracy of the main results: a run warns of those whose estimated error is larger, and "
+        "of pressure and fretting parameter at worn edges if it is five times as large [1]",
         "5 %",
         default=0.05,
     )
     error_budget: Literal["probed", "known"] = entry(
-        "probed: probe runs on a finer mesh and another grid estimate their errors; known: only "
-        "what the run knows of itself",
+        "probed: short probe runs on a finer mesh and a coarser grid estimate the errors of "
+        "these; known: only what the run itself knows",
         "probed",
         default="probed",
     )
@@ -149,7 +151,7 @@ class WearCase(WithScans, Case):
         if self.contact.method != "nodes":
             return self
         if not isinstance(self, FiniteElementCase):
-            raise disagreement("nodes: nothing is meshed; allowed: normal, full", "contact.method")
+            raise disagreement("nodes: without a mesh; allowed: normal, full", "contact.method")
         terms = self.every_terms
         evolutions = [getattr(law, "evolution", None) for each in terms for law in each.laws]
         worn_by_all = any(e is not None and e.scope == "global" for e in evolutions)
@@ -164,13 +166,14 @@ class WearCase(WithScans, Case):
                 "one wear law for all contacts, that of wear",
             ),
             "load_path.mix": (mixed, "one mission"),
-            "loops": (self.loops.wanted, "leave them out: they are those of a half-space"),
+            "loops": (self.loops.wanted, "leave them out: the bodies are half-spaces"),
             "fidelity": (getattr(self, "fidelity", "fixed") != "fixed", "fixed"),
         }
         for key, (given, allowed) in wrong.items():
             if given:
                 raise disagreement(
-                    f"not where nodes wear (contact.method: nodes); allowed: {allowed}", key
+                    f"not available where nodes wear (contact.method: nodes); allowed: {allowed}",
+                    key,
                 )
         return self
 
@@ -226,15 +229,15 @@ class FiniteElementCase(WearCase):
     """Case whose loads come from a finite element structure."""
 
     nonlinearity: NonlinearitySection = entry(
-        "geometric, of the structure", default=NonlinearitySection()
+        "geometric nonlinearity of the structure", default=NonlinearitySection()
     )
-    coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
+    coupling: Coupling = entry("return of worn surfaces to the structure", default=Coupling())
 
     def told_of_nodes(self) -> Iterator[str]:
         """Yield remarks on measured surfaces with more detail than the nodes can follow."""
-        half_space = "the half-space has all that the grid carries"
+        half_space = "the half-space resolves what its grid does"
         yield from self.finer_than_nodes(
-            "nothing has more" if self.contact.method == "nodes" else half_space
+            "only the nodes are known" if self.contact.method == "nodes" else half_space
         )
 
     @property
@@ -259,8 +262,8 @@ class FiniteElementCase(WearCase):
         if any(self.legs):
             return f"{count} increments"
         return (
-            f"as many increments as leave {shares(self.wear.tolerance)} of depth, about "
-            f"{min(count, MOST_INCREMENTS)} and at most {MOST_INCREMENTS}"
+            f"as many increments as depth needs for an error of {shares(self.wear.tolerance)}, "
+            f"about {min(count, MOST_INCREMENTS)} and at most {MOST_INCREMENTS}"
         )
 
     @property

@@ -23,7 +23,9 @@ TotalEnergy = Annotated[
     float, Quantity("N*mm", at_least=0.0, at_most=1e15, range_text="0 to 1e12 J")
 ]
 Factor = Annotated[float, Quantity("1", at_least=0.0, at_most=1e6)]
-TOTAL = entry("dissipated so far in the contact, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,))
+TOTAL = entry(
+    "energy dissipated so far in the contact, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,)
+)
 LARGEST_FRICTION = 2.0  # as for the coefficient itself
 
 
@@ -32,7 +34,7 @@ class Table(Section):
 
     energy: tuple[float, ...]  # each table narrows it to its own unit
     factor: tuple[Factor, ...] = entry(
-        "of the coefficient at these energies; linear between, constant beyond [1]",
+        "factor of the coefficient at these energies; linear between, constant beyond [1]",
         [1.0, 0.3],
         default=(1.0,),
     )
@@ -42,7 +44,7 @@ class Table(Section):
         energies, factors = len(self.energy), len(self.factor)
         if not energies or energies != factors:
             raise disagreement(
-                f"{factors} factors for {energies} energies; allowed: one or more, as many of both",
+                f"{factors} factors for {energies} energies; allowed: as many of both, one or more",
                 *("factor", "energy"),
             )
         if any(after <= before for before, after in pairwise(self.energy)):
@@ -70,19 +72,25 @@ class _WearEvolution(Table, _Scope):
 class LocalEvolution(_WearEvolution):
     """The coefficient at each place against the local energy per area of this body's surface."""
 
-    scope: Literal["local"] = entry("local, by place, or global, of the whole contact", "local")
+    scope: Literal["local"] = entry("local: by place; global: of the whole contact", "local")
     energy: tuple[EnergyPerArea, ...] = entry(
-        "dissipated so far per area, ascending [N/mm]", ["0 J/mm^2", "10 J/mm^2"], default=(0.0,)
+        "energy dissipated so far per area, ascending [N/mm]",
+        ["0 J/mm^2", "10 J/mm^2"],
+        default=(0.0,),
     )
-    threshold: EnergyPerArea = entry("below which nothing wears [N/mm]", "1 J/mm^2", default=0.0)
+    threshold: EnergyPerArea = entry(
+        "energy per area below which nothing wears [N/mm]",
+        "1 J/mm^2",
+        default=0.0,
+    )
 
 
 class GlobalEvolution(_WearEvolution):
     """The coefficient against the energy of the whole contact."""
 
-    scope: Literal["global"] = entry("local, by place, or global, of the whole contact", "global")
+    scope: Literal["global"] = entry("local: by place; global: of the whole contact", "global")
     energy: tuple[TotalEnergy, ...] = TOTAL
-    threshold: TotalEnergy = entry("below which nothing wears [N*mm]", "100 J", default=0.0)
+    threshold: TotalEnergy = entry("energy below which nothing wears [N*mm]", "100 J", default=0.0)
 
 
 Evolution = Annotated[LocalEvolution | GlobalEvolution, Field(discriminator="scope")]
@@ -98,7 +106,7 @@ class EvolvingFriction(Friction):
     """Coulomb friction that wear may change."""
 
     evolution: FrictionEvolution | None = entry(
-        "of the coefficient with dissipated energy; without it none", default=None
+        "change of the coefficient with dissipated energy; without it none", default=None
     )
 
     @model_validator(mode="after")

@@ -29,14 +29,16 @@ class RoundedGap(Section):
     in_schema: ClassVar[Mapping[str, Any]] = together("end_width", "end_radius")
 
     shape: Literal["rounded"] = entry("rounded, paraboloid or heights", "rounded")
-    edge_width: Length = entry("of each rounded edge, inside the size along x [mm]", "1.5 mm")
-    edge_radius: RoundingRadius = entry("of the rounded edges [mm]", "30 mm")
+    edge_width: Length = entry("width of each rounded edge, within the size along x [mm]", "1.5 mm")
+    edge_radius: RoundingRadius = entry("radius of the rounded edges [mm]", "30 mm")
     end_width: Length | None = entry(
-        "of each rounded end, inside the size along y; counts for nothing in 2 dimensions [mm]",
+        "width of each rounded end, within the size along y; ignored in 2 dimensions [mm]",
         "3 mm",
         default=None,
     )
-    end_radius: RoundingRadius | None = entry("of the rounded ends [mm]", "150 mm", default=None)
+    end_radius: RoundingRadius | None = entry(
+        "radius of the rounded ends [mm]", "150 mm", default=None
+    )
 
     @model_validator(mode="after")
     def _arcs_exist(self) -> RoundedGap:
@@ -55,8 +57,8 @@ def check_arcs(face: Section) -> None:
         width, radius = getattr(face, f"{name}_width"), getattr(face, f"{name}_radius")
         if width is not None and width >= radius:
             raise disagreement(
-                f"{width:g} mm: the rounding ends beyond its own arc; "
-                f"allowed: below {name}_radius, {radius:g} mm",
+                f"{width:g} mm: the rounding ends beyond its own arc; allowed: below "
+                f"{name}_radius, {radius:g} mm",
                 *(f"{name}_width", f"{name}_radius"),
             )
 
@@ -69,10 +71,10 @@ class ParaboloidGap(Section):
 
     shape: Literal["paraboloid"] = entry("rounded, paraboloid or heights", "paraboloid")
     radius_x: RoundingRadius | None = entry(
-        "relative, of the section along x; without it straight [mm]", "300 mm", default=None
+        "relative radius of the section along x; without it straight [mm]", "300 mm", default=None
     )
     radius_y: RoundingRadius | None = entry(
-        "relative, of the section along y; without it straight [mm]", "10 m", default=None
+        "relative radius of the section along y; without it straight [mm]", "10 m", default=None
     )
 
     @model_validator(mode="after")
@@ -87,7 +89,7 @@ class HeightsGap(Section):
 
     shape: Literal["heights"] = entry("rounded, paraboloid or heights", "heights")
     file: Annotated[str, File((".npy", ".csv", ".h5"))] = entry(
-        "gap in mm, rows along x, columns along y; for .h5 with :dataset at the end", "gap.npy"
+        "file with the gap in mm, rows along x, columns along y; for .h5 add :dataset", "gap.npy"
     )
 
 

@@ -21,26 +21,34 @@ class Loops(Section):
     There are none unless ``amplitude`` or ``force`` is given.
     """
 
-    amplitude: Length | None = entry("of the motion to and fro [mm]", "5 um", default=None)
+    amplitude: Length | None = entry("amplitude of the motion [mm]", "5 um", default=None)
     force: LoopForce | None = entry(
-        "instead of amplitude, below µP; in the plane per length [N]", "100 N", default=None
+        "amplitude of the force instead, below µP; per length in two dimensions [N]",
+        "100 N",
+        default=None,
     )
-    axis: Literal["x", "y"] = entry("of the contact's frame, to move along", "x", default="x")
+    axis: Literal["x", "y"] = entry(
+        "axis of the contact's frame along which it moves", "x", default="x"
+    )
     increments: Annotated[int, Whole(2, 1000)] = entry(
-        "of each branch: a finer picture, the energy hardly needs them", 12, default=12
+        "increments of each branch: more give a finer picture and hardly change the energy",
+        12,
+        default=12,
     )
     normal_force: LoopForce | None = entry(
-        "without it that at peak load; in the plane per length [N]", "60 N", default=None
+        "normal force; without it that at peak load; per length in two dimensions [N]",
+        "60 N",
+        default=None,
     )
     every: Literal["jump", "end"] = entry(
-        "jump: unworn and after every wear step; end: unworn and at the end", "jump", default="jump"
+        "jump: unworn and after every jump; end: unworn and at the end", "jump", default="jump"
     )
 
     @model_validator(mode="after")
     def _one_drive(self) -> Loops:
         if self.amplitude is not None and self.force is not None:
             raise disagreement(
-                "amplitude and force given; allowed: one of them, or none for no loops", "force"
+                "amplitude and force given; allowed: one of them, or neither for no loops", "force"
             )
         return self
 

@@ -89,9 +89,9 @@ class ScannedFace:
                 apart = float(np.abs(on.heights - np.flip(on.heights, axis)).max())
                 if apart > MIRRORED * np.ptp(on.heights):
                     raise disagreement(
-                        f"{self.surfaces.bodies[name].file}: not the same on both sides of the "
-                        f"plane of symmetry across {'xy'[axis]} that cuts the face, by up to "
-                        f"{plain(apart, 'mm', 3)}; allowed: heights that are, or a mesh of the "
+                        f"{self.surfaces.bodies[name].file}: not symmetric about the plane of "
+                        f"symmetry across {'xy'[axis]} that cuts the face: it differs by up to "
+                        f"{plain(apart, 'mm', 3)}; allowed: symmetric heights, or a mesh of the "
                         "whole face",
                         f"{self.key}.{name}.file",
                     )
@@ -124,9 +124,10 @@ class ScannedFace:
             lost, height = numbers["lost_by_nodes"], numbers["rms"]
             if lost > LOST * height:
                 yield (
-                    f"{self.name}, {name.replace('_', ' ')}: {plain(lost, 'mm', 3)} of the surface "
-                    f"as measured, {plain(height, 'mm', 3)} rms, is finer than the nodes of the "
-                    f"face, which have means about them; {rest}"
+                    f"{self.name}, {name.replace('_', ' ')}: the nodes of the face lose "
+                    f"{plain(lost, 'mm', 3)} of the measured surface, {plain(height, 'mm', 3)} "
+                    "rms, because it is finer than they are: they get the mean around each of "
+                    f"them; {rest}"
                 )
 
 

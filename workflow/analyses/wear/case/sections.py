@@ -56,7 +56,9 @@ SHARES_APART = 1e-6
 def check_shares(shares: Sequence[float]) -> None:
     """Refuse a mix of missions whose shares do not add up to 1."""
     if abs(sum(shares) - 1.0) > SHARES_APART:
-        raise disagreement(f"shares that add up to {sum(shares):g}; allowed: to 1", "mix")
+        raise disagreement(
+            f"shares that add up to {sum(shares):g}; allowed: shares that add up to 1", "mix"
+        )
 
 
 Part = TypeVar("Part", bound=Section)
@@ -82,7 +84,7 @@ class Solid(ElasticSection):
     young: Stress = entry("Young's modulus [MPa]", "115 GPa")
     poisson: Poisson = entry("Poisson's ratio [1]", 0.29)
     yield_stress: Stress | None = entry(
-        "pressures above it are warned of; without it none [MPa]", "900 MPa", default=None
+        "a run warns of pressures above it; without it never [MPa]", "900 MPa", default=None
     )
 
 
@@ -104,30 +106,32 @@ class ContactSection(Section):
     """Half-space solution on a grid over each contact face."""
 
     grid: FaceCells = entry(
-        "cells along x, along y of every face; of line contacts along x alone, 256 or [256, 1]",
+        "number of cells along x, along y of every face; for line contacts along x alone, "
+        "256 or [256, 1]",
         [128, 256],
         default=(128, 256),
     )
     method: Literal["normal", "full", "nodes"] = entry(
-        "normal: pressure of the half-space, slips of the structure; full: both of the half-space; "
-        "nodes: finite elements alone, whose nodes wear: without a half-space, slow on fine meshes",
+        "normal: pressure of the half-space, slips of the structure; full: both of the "
+        "half-space; nodes: finite elements alone, whose nodes wear: no half-space, slow on fine "
+        "meshes",
         "normal",
         default="normal",
     )
     link: Literal["corrected", "half_space"] = entry(
-        "corrected: the bodies deform as the structure says, where it says it at its nodes; "
-        "half_space: as half-spaces",
+        "corrected: the bodies deform as the structure does, where its nodes tell; half_space: "
+        "as half-spaces",
         "corrected",
         default="corrected",
     )
     gross_slip: Literal["force", "energies"] = entry(
-        "direction in which a face slides as a whole (method full): force: with the structure's "
-        "shear force; energies: sharing the structure's energy between x and y",
+        "direction in which a face slides as a whole (method full): force: that of the "
+        "structure's shear force; energies: shares of x and y in the structure's energy",
         "force",
         default="force",
     )
     tolerance: Tolerance = entry(
-        "relative, on equilibrium and complementarity [1]", 1e-8, default=1e-8
+        "relative tolerance of equilibrium and complementarity [1]", 1e-8, default=1e-8
     )
 
 
@@ -146,17 +150,17 @@ class Step(Section):
     filled_in: ClassVar[bool] = False
 
     kind: Literal["explicit", "implicit", "second_order"] = entry(
-        "implicit and second_order are stable at any size, explicit below a limit",
+        "implicit and second_order are stable at any size, explicit only below a limit",
         "implicit",
         default="implicit",
     )
-    cycles: Cycles | None = entry("jumped in a step [1]", 30000, default=None)
+    cycles: Cycles | None = entry("cycles that a step jumps [1]", 30000, default=None)
     depth: Length | None = entry("largest depth worn in a step [mm]", "1 um", default=None)
     volume: Volume | None = entry(
-        "worn in a step; in the plane per length [mm^3]", "0.01 mm^3", default=None
+        "volume worn in a step; per length in two dimensions [mm^3]", "0.01 mm^3", default=None
     )
     fraction: Annotated[float, Quantity("1", above=0.0, at_most=10.0)] | None = entry(
-        "of the stability limit, for explicit steps [1]", 0.9, default=None
+        "share of the stability limit, for explicit steps [1]", 0.9, default=None
     )
 
     @model_validator(mode="after")
@@ -187,7 +191,7 @@ class StopSection(Section):
 
     depth: Length | None = entry("largest depth of either body [mm]", "0.5 mm", default=None)
     volume: Volume | None = entry(
-        "worn from both bodies; in the plane per length [mm^3]", "10 mm^3", default=None
+        "volume worn from both bodies; per length in two dimensions [mm^3]", "10 mm^3", default=None
     )
 
 
@@ -195,18 +199,20 @@ class Duration(Section):
     """Length, steps and tolerances of wear, for every wear law."""
 
     law: str  # first in every wear section; each law narrows it to its own name
-    cycles: Cycles = entry("of the whole run [1]", 3e5)
-    step: Step = entry("how far one wear step jumps", default=Step())
+    cycles: Cycles = entry("number of cycles of the whole run [1]", 3e5)
+    step: Step = entry("size of a wear step", default=Step())
     tolerance: Annotated[float, Quantity("1", above=0.0, at_most=1.0)] = entry(
-        "error of the depth that steps of no given size may make, root mean square over the worn "
-        "area, relative to the depth at the end [1]",
+        "error of the depth that steps of no given size may cause, root mean square over the "
+        "worn area, relative to the depth at the end [1]",
         "1 %",
         default=0.01,
     )
-    depth_tolerance: Length | None = entry("instead of tolerance [mm]", "0.05 um", default=None)
+    depth_tolerance: Length | None = entry(
+        "the same error in absolute terms, instead of tolerance [mm]", "0.05 um", default=None
+    )
     motion: Literal["auto", "follow", "neglect"] = entry(
-        "of the surfaces over each other within a cycle: auto follows it where it is more than a "
-        "tenth of the contact's width and the grid can resolve it",
+        "motion of the surfaces over each other within a cycle: auto follows it where it exceeds "
+        "a tenth of the contact's width and the grid resolves it",
         "auto",
         default="auto",
     )
@@ -235,7 +241,7 @@ class Laws(Section):
 
     law: LawName = entry("energy, energy_amplitude or archard; a body may name its own", "energy")
     reference_amplitude: Length | None = entry(
-        "at which coefficients of energy_amplitude hold [mm]", "75 um", default=None
+        "slip amplitude at which coefficients of energy_amplitude hold [mm]", "75 um", default=None
     )
 
     @model_validator(mode="before")
@@ -295,13 +301,13 @@ class NonlinearitySection(Section):
     """Geometric nonlinearity: its effect is small for stiff joints, and the check measures it."""
 
     stiffness: Literal["linear", "stress_stiffened", "relinearised"] = entry(
-        "linear; stress_stiffened: with the stress and spin of peak load; relinearised: tangent to "
-        "the nonlinear structure there",
+        "linear; stress_stiffened: with the stress and spin at peak load; relinearised: tangent "
+        "to the nonlinear structure there",
         "linear",
         default="linear",
     )
     check: StrictBool = entry(
-        "compare with a total Lagrangian model at peak load (two more condensations)",
+        "compare with a total Lagrangian model at peak load (takes two more condensations)",
         False,
         default=False,
     )
@@ -323,14 +329,14 @@ class Coupling(Section):
     """How often the loads are computed again with the worn surfaces."""
 
     resultants: Literal["constant", "drift", "every"] = entry(
-        "constant: of the unworn structure; drift: computed again when wear changes them; every: "
-        "after every jump",
+        "constant: those of the unworn structure; drift: updated when wear has changed them "
+        "enough; every: updated after every jump",
         "drift",
         default="drift",
     )
     drift: Ratio = entry(
-        "change of resultants, or half the share of the load that wear moves over a face, that "
-        "asks for new ones, when they may drift [1]",
+        "change of resultants, or half the share of the load that wear moves over a face, after "
+        "which drift updates them [1]",
         "2 %",
         default=0.02,
     )
@@ -340,18 +346,18 @@ class Life(Section):
     """Map of a fretting parameter over each contact face."""
 
     parameter: Literal["ruiz", "smith_watson_topper", "findley", "none"] = entry(
-        "ruiz: friction work times tension; smith_watson_topper, findley: worst plane, tens of "
-        "times slower; or none",
+        "ruiz: friction work times tension; smith_watson_topper, findley: on the worst plane, "
+        "tens of times slower; or none",
         "ruiz",
         default="ruiz",
     )
     depth: Length = entry(
-        "critical distance below the surface, where the map lies and the section begins [mm]",
+        "critical distance below the surface, at which the map lies and the section begins [mm]",
         "20 um",
         default=0.02,
     )
     sensitivity: Annotated[float, Quantity("1", at_least=0.0, at_most=10.0)] = entry(
-        "k of findley, to normal stress [1]", 0.3, default=0.3
+        "k of findley, the weight of the normal stress [1]", 0.3, default=0.3
     )
 
 
@@ -364,20 +370,20 @@ class ContactStress(Section):
         default="x",
     )
     at: Place = entry(
-        "where the plane cuts the other axis, 0 being the middle [mm]", "0 mm", default=0.0
+        "position of the plane on the other axis, from the middle [mm]", "0 mm", default=0.0
     )
-    depth: Length = entry("of the plane [mm]", "2 mm", default=2.0)
+    depth: Length = entry("depth of the plane [mm]", "2 mm", default=2.0)
     points: Annotated[int, Whole(2, 1000)] = entry(
-        "over the depth, denser towards the surface", 24, default=24
+        "number of points over the depth, denser towards the surface", 24, default=24
     )
-    life: Life = entry("where fretting cracks would start", default=Life())
+    life: Life = entry("fretting life: where cracks would start", default=Life())
 
     @model_validator(mode="after")
     def _section_has_depth(self) -> ContactStress:
         if self.depth <= self.life.depth:
             raise disagreement(
-                f"{self.depth:g} mm: not below the critical distance; "
-                f"allowed: above life.depth, {self.life.depth:g} mm",
+                f"{self.depth:g} mm: not below the critical distance; allowed: above life.depth, "
+                f"{self.life.depth:g} mm",
                 *("depth", "life.depth"),
             )
         return self

@@ -33,7 +33,7 @@ class Worn(Section):
 
     law: str  # first in the section; each law narrows it to its own name
     evolution: Evolution | None = entry(
-        "of the coefficient with dissipated energy; without it none", default=None
+        "change of the coefficient with dissipated energy; without it none", default=None
     )
 
     def described(self) -> WearLaw:
@@ -56,9 +56,9 @@ class EnergyBody(Section):
     """Wear of one body by dissipated energy."""
 
     refused: ClassVar[Mapping[str, str]] = {
-        "specific_wear_rate": "of archard; allowed: coefficient, which is that rate over the "
-        "coefficient of friction, or law: archard",
-        "hardness": "of archard; allowed: coefficient alone, or law: archard",
+        "specific_wear_rate": "belongs to archard; allowed: coefficient, which is that rate over "
+        "the coefficient of friction, or law: archard",
+        "hardness": "belongs to archard; allowed: coefficient alone, or law: archard",
     }
 
     coefficient: VolumePerEnergy = entry(
@@ -74,7 +74,11 @@ class EnergyBody(Section):
 class WornByEnergy(Worn, EnergyBody):
     """Depth = coefficient x dissipated energy per area."""
 
-    law: Literal["energy"] = entry("of this body; without it wear.law", "energy", default=None)
+    law: Literal["energy"] = entry(
+        "law of this body; without it wear.law",
+        "energy",
+        default=None,
+    )
 
     def rate(self, friction: float) -> float:
         return self.coefficient * friction
@@ -89,10 +93,10 @@ class WornByEnergyAmplitude(Worn, EnergyBody):
     also_filled_in: ClassVar[tuple[str, ...]] = ("reference_amplitude",)
 
     law: Literal["energy_amplitude"] = entry(
-        "of this body; without it wear.law", "energy_amplitude", default=None
+        "law of this body; without it wear.law", "energy_amplitude", default=None
     )
     reference_amplitude: Length | None = entry(
-        "at which the coefficient holds; without it wear.reference_amplitude [mm]",
+        "amplitude at which the coefficient holds; without it wear.reference_amplitude [mm]",
         "75 um",
         default=None,
     )
@@ -110,16 +114,18 @@ class WornByArchard(Worn):
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("coefficient", "hardness")
 
-    law: Literal["archard"] = entry("of this body; without it wear.law", "archard", default=None)
+    law: Literal["archard"] = entry(
+        "law of this body; without it wear.law", "archard", default=None
+    )
     coefficient: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] | None = entry(
-        "Archard's wear coefficient K = V H / (P s), beside hardness [1]", 1e-4, default=None
+        "Archard's wear coefficient K = V H / (P s), given with hardness [1]", 1e-4, default=None
     )
     hardness: (
         Annotated[
             float, Quantity("MPa", above=0.0, at_most=1e5, range_text="above 0 and at most 100 GPa")
         ]
         | None
-    ) = entry("H of the worn body, beside coefficient [MPa]", "3.5 GPa", default=None)
+    ) = entry("hardness H of the worn body, given with coefficient [MPa]", "3.5 GPa", default=None)
     specific_wear_rate: (
         Annotated[
             float,
@@ -155,7 +161,7 @@ class WornByArchard(Worn):
             return self
         if "specific_wear_rate" in given:
             raise disagreement(
-                f"given beside {given[0]}; allowed: it alone, or coefficient and hardness",
+                f"given with {given[0]}; allowed: it alone, or coefficient and hardness",
                 "specific_wear_rate",
             )
         key = next(key for key in ARCHARDS if key not in given)
@@ -163,7 +169,7 @@ class WornByArchard(Worn):
         (example,) = field.examples or ("",)
         raise disagreement(
             f"missing; allowed: {field.description}, such as {example}; or specific_wear_rate, "
-            "which has both in it",
+            "which includes both",
             key,
         )
 

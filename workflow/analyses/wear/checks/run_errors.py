@@ -13,6 +13,7 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Duration
 from workflow.analyses.wear.output.outcome import InterfaceOutcome
 from workflow.analyses.wear.structures import structure_of
+from workflow.case.text.readable import percent
 from workflow.shell.terminal.reporter import Reporter
 
 # Largest error of the peak pressure due to steps without a warning.
@@ -52,9 +53,9 @@ def warn_of_errors(
         fewest = min(mission.stop - mission.start for mission in state.loads.missions)
         if len(state.paths) and fewest < FEW_INCREMENTS:
             reporter.warn(
-                f"{name}: the bodies move over each other in {fewest} increments a cycle: they "
-                "wear edges into each other at which the worn peak pressure is too large, by a "
-                f"fifth with 16 and more with fewer; take {FEW_INCREMENTS}"
+                f"{name}: the bodies move over each other in only {fewest} increments per cycle "
+                "and wear false edges into each other: the worn peak pressure is too large, by a "
+                f"fifth with 16 increments and more with fewer; take {FEW_INCREMENTS}"
             )
 
 
@@ -109,12 +110,12 @@ def _warn_of_steps(
         allowed = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
     if wear.step.automatic and error > allowed:
         reporter.warn(
-            f"{name}: wear steps leave an estimated error of {error:.2%} of depth and volume "
-            f"where {allowed:.2%} was asked for (wear.tolerance): take shorter steps ({shorter})"
+            f"{name}: wear steps cause an estimated error of {percent(error)} of depth and volume, "
+            f"above wear.tolerance ({percent(allowed)}): take shorter steps ({shorter})"
         )
     if estimate["pressure"] > PEAK:
         reporter.warn(
-            f"{name}: wear steps leave an estimated error of {estimate['pressure']:.0%} of the "
-            "peak pressure on the worn surfaces, and of what follows from it (fretting life): "
-            f"take shorter steps ({shorter})"
+            f"{name}: wear steps cause an estimated error of {percent(estimate['pressure'])} of "
+            "the worn peak pressure and of what follows from it (fretting life): take shorter "
+            f"steps ({shorter})"
         )

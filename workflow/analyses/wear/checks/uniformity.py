@@ -18,6 +18,8 @@ from fe_models.structure import InterfaceHistory
 from sa_solver.cycles.increments import friction_work
 from sa_solver.types import Array
 from wear.contact.interface import InterfaceState
+from workflow.case.text.plain import shares
+from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
@@ -95,14 +97,17 @@ class Uniformity:
     def sentence(self, name: str) -> str:
         """Return a sentence for the log."""
         text = (
-            f"{name}: sections alike within {ALIKE:.0%} over the middle "
-            f"{self.share_of_length_within:.0%} of the length"
+            f"{name}: sections differ by less than {shares(ALIKE)} over the middle "
+            f"{percent(self.share_of_length_within)} of the length"
         )
         if not self.uniform:
-            return f"{text}: too uneven for two dimensions"
+            return f"{text}: too uneven for a model in two dimensions"
         extra = self.mean_load - 1.0
         more = "more" if extra >= 0.0 else "less"
-        return f"{text}: two dimensions give the middle, with {abs(extra):.1%} {more} load"
+        return (
+            f"{text}: a model in two dimensions gives the middle, with {percent(abs(extra))} "
+            f"{more} load"
+        )
 
 
 def uniformities(

@@ -15,6 +15,7 @@ from workflow.analyses.wear.output.link_report import report_link
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.case.text.plain import counted
+from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
@@ -47,21 +48,24 @@ def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: 
     unworn = stage.unworn_cycle
     if unworn.closure > CLOSED:
         reporter.warn(
-            f"the last two of {unworn.cycles} cycles differ by {unworn.closure:.2%} of the largest "
-            "contact force: the cycle that feeds the wear is not closed"
+            "the cycle that feeds the wear is not closed: the contact forces of the last two of "
+            f"{unworn.cycles} cycles differ by {percent(unworn.closure)} of the largest"
         )
     imbalance = float(unworn.equilibrium.max())
     if imbalance > OUT_OF_BALANCE:
         reporter.warn(
-            f"forces and moments on a body are out of balance by {imbalance:.1e}: the stiffness of "
-            "peak load does not suit the other increments (nonlinearity.stiffness)"
+            f"forces and moments on a body are out of balance by {imbalance:.1e} (relative): the "
+            "stiffness at peak load does not suit the other increments; change "
+            "nonlinearity.stiffness"
         )
     for history in unworn.histories:
         name, P = history.interface.name, history.loads.P
         if P.max() <= 0.0:
-            reporter.warn(f"{name} is open all the time: it does not wear")
+            reporter.warn(f"{name} is never closed: it does not wear")
         elif P[stage.peak] <= 0.0:
-            reporter.warn(f"{name} is open at peak load: its pressure and stress there are none")
+            reporter.warn(
+                f"{name} is open at peak load: there is no pressure and no stress to show there"
+            )
         else:
             _warn_of_few_nodes(history, stage, reporter)
             _warn_of_form(history, stage, reporter)
@@ -76,9 +80,9 @@ def _warn_of_few_nodes(
     least = FEWEST_NODES if face.line else FEWEST_NODES**2
     if pressed < min(least, len(face)):
         reporter.warn(
-            f"{face.name}: the peak load is carried by {counted(pressed, 'node')} of a mesh of "
-            f"{_mesh_size(face):.2g} mm, where {least} tell a contact from a point: its slip and "
-            f"tilt are the mesh's; {stage.model.finer}"
+            f"{face.name}: only {counted(pressed, 'node')} of a mesh of {_mesh_size(face):.2g} mm "
+            f"carry the peak load, and {least} are needed to resolve a contact: its slip and tilt "
+            f"depend on the mesh; {stage.model.finer}"
         )
 
 
@@ -94,9 +98,9 @@ def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Re
     share = float(waves / history.pressure[stage.peak].max())
     if share > FORM_SHARE:
         reporter.warn(
-            f"{face.name}: vertices alone tell the form of its faces to {1e3 * unsure:.2g} µm, "
-            f"which may be {share:.0%} of its peak pressure; give the bodies as CAD, or with "
-            "midside nodes"
+            f"{face.name}: the form of its faces is uncertain by {1e3 * unsure:.2g} µm, as the "
+            f"mesh has only corner nodes; the peak pressure may be wrong by {percent(share)}: "
+            "give the bodies as CAD, or with midside nodes"
         )
 
 
@@ -121,9 +125,9 @@ def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:
     closures = [imported.closure or 0.0 for imported in source.imported.values()]
     if max(closures) > CLOSED:
         reporter.warn(
-            f"structure.file: {source.file}: its cycle differs from the one before by "
-            f"{max(closures):.2%} of the largest contact force: the cycle that feeds the wear is "
-            "not closed; march more cycles there, and take the last"
+            f"structure.file: {source.file}: the cycle that feeds the wear is not closed: its "
+            f"contact forces differ from the cycle before by {percent(max(closures))} of the "
+            "largest; compute more cycles there, and take the last"
         )
 
 
@@ -143,10 +147,10 @@ def warn_of_contact(
     if case.contact.method == "normal" and unlike:
         pair = max(unlike, key=lambda pair: abs(pair.dundurs_beta))
         linked = all(result.link.corrects for result in first)
-        has = "has only as far as the mesh resolves it" if linked else "leaves out"
+        has = "resolves only as far as the mesh does" if linked else "neglects"
         reporter.warn(
-            f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}): shear then moves the "
-            f"surfaces normally, which contact.method: normal {has}; use full"
+            f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}), so shear moves the "
+            f"surfaces normally, which contact.method: normal {has}: use full"
         )
     for stage, interface, result in zip(stages, state.interfaces, first, strict=True):
         terms = case.terms(stage.name)
@@ -182,21 +186,21 @@ def _energies_apart(
     if not first.cycle:
         whose = "structure.file" if from_file else "the structure"
         return (
-            f"pressure on the grid and slip of {whose} dissipate {found:.3g} {unit} a cycle, "
-            f"{whose} {stated:.3g}: its mesh is too coarse for the slip zone, or little slips; "
-            "refine it or use contact.method: full"
+            f"pressure on the grid and slip of {whose} dissipate {found:.3g} {unit} per cycle, "
+            f"{whose} itself {stated:.3g}: its mesh is too coarse for the slip zone, or little "
+            "slips; refine it or use contact.method: full"
         )
     if from_file and abs(found - stated) > NO_ENERGY * _work_of_sliding(stage, loads):
         return (
-            f"structure.file says that {stated:.3g} {unit} are dissipated a cycle, the half-space "
-            f"finds {found:.3g} under the same forces, and wears by it: check Edx and Edy (of each "
-            "increment alone), friction.coefficient, size and gap of the face, and that the mesh "
-            "that they are from is fine enough for the slip zone"
+            f"structure.file gives {stated:.3g} {unit} of dissipated energy per cycle, but the "
+            f"half-space finds {found:.3g} under the same forces, and wears by it: check Edx and "
+            "Edy (of each increment alone), friction.coefficient, size and gap of the face, and "
+            "whether the mesh behind the file resolves the slip zone"
         )
     if isinstance(source, StructureLoads) and stated > found / (1.0 - FULL_APART):
         return (
-            f"the structure's nodes dissipate {stated:.3g} {unit} a cycle, the half-space with its "
-            f"own friction {found:.3g}, and wears by it: the mesh is too coarse for the slip zone; "
+            f"the structure's nodes dissipate {stated:.3g} {unit} per cycle, but the half-space, "
+            f"by which the contact wears, {found:.3g}: the mesh is too coarse for the slip zone; "
             "refine it"
         )
     return ""
@@ -218,8 +222,8 @@ def warn_of_instability(
     stable = min(stage.stable_cycles(interface) for stage, interface in pairs)
     if cycles > stable:
         reporter.warn(
-            f"explicit wear steps above {stable:.3g} cycles amplify the grid's roughness "
-            "(wear.step): use implicit steps or smaller ones"
+            f"explicit wear steps above {stable:.3g} cycles amplify the roughness of the grid: "
+            "use implicit or smaller steps (wear.step)"
         )
 
 
@@ -237,8 +241,8 @@ def warn_of_many_jumps(wear: Duration, state: CoupledState, left: int, reporter:
     longer = "wear.tolerance" if key is None else f"wear.step.{key}"
     reporter.warn(
         f"{state.jump} wear jumps have worn {state.cycles[-1]:.3g} of {wear.cycles:g} cycles, and "
-        f"about {left} are to come: each of them takes time and a place in the results; a larger "
-        f"{longer} makes them fewer"
+        f"about {left} more are needed, each of which takes time and space in the results: a "
+        f"larger {longer} needs fewer"
     )
 
 

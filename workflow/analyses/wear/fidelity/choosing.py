@@ -56,6 +56,6 @@ def _decide(approximation: Approximation, case: DovetailCase, allowed: float) ->
     try:
         decision = approximation.decide(case, allowed)
     except FAILURES as error:
-        why = f"as the case has it: the probe failed: {error}"
+        why = f"as the case says, because the probe failed: {error}"
         decision = Decision({entry: entry_at(case, entry)}, why, allowed)
     return decision.timed(begin)

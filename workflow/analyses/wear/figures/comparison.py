@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from workflow.analyses.wear.output.layout import WearContents
+from workflow.case.text.readable import percent
 from workflow.pictures.fields import PROFILE_MARGIN, centres, middle, near_middle, view_of
 from workflow.pictures.panels import (
     blocks,
@@ -151,4 +152,4 @@ def _largest_difference(file: h5py.File, contents: WearContents) -> str:
             half_space["Qx"][()] - structure["Qx"][()], half_space["Qy"][()] - structure["Qy"][()]
         )
         largest = max(largest, float((gap[limit > 0.0] / limit[limit > 0.0]).max(initial=0.0)))
-    return f"Half-space against {contents.loads}: Q differs by at most {largest:.1%} of µP"
+    return f"Half-space against {contents.loads}: Q differs by at most {percent(largest)} of µP"

@@ -25,7 +25,7 @@ def error_budget(file: h5py.File, contents: WearContents) -> Figure:
         panels += [
             (name, body["error"]) for name, body in file["bodies"].items() if "error" in body
         ]
-    title = "Estimated errors of the main results, and what leaves them"
+    title = "Estimated errors of the main results, by source"
     bars = [1 + len(group) for _, group in panels]
     figure = new_figure(title, 1.5 + HEIGHT * sum(bars))
     grid = {"height_ratios": bars}
@@ -33,7 +33,7 @@ def error_budget(file: h5py.File, contents: WearContents) -> Figure:
     for axis, (name, group) in zip(axes, panels, strict=True):
         _draw(axis, group)
         axis.set_title(name)
-    axes[-1].set_xlabel("estimated error [%], above 0: the run tells too much")
+    axes[-1].set_xlabel("estimated error [%], above 0: the result is too large")
     legend_below(figure, axes)
     return figure
 

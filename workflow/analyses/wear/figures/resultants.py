@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Mask
 from workflow.analyses.wear.output.layout import WearContents, energy_name
+from workflow.case.text.readable import percent
 from workflow.pictures.panels import (
     blocks,
     change,
@@ -94,13 +95,13 @@ def _cycles_shown(file: h5py.File, contents: WearContents) -> str:
         return "one cycle"
     loads = file["structure"][contents.names[0]]["load_history"]
     _, first = np.unique(loads["block"][()], return_index=True)
-    return f"a mix of {', '.join(f'{share:.0%}' for share in loads['share'][()][first])}"
+    return f"a mix of {', '.join(f'{percent(share)}' for share in loads['share'][()][first])}"
 
 
 def _who_slides(loads: dict[str, dict[str, Array]]) -> str:
     """Return the share of sliding increments, for the title."""
     share = np.mean(np.concatenate([history["sliding"] for history in loads.values()]))
-    return f"faces slide as a whole in {share:.0%} of the increments" if share else NO_SLIDING
+    return f"faces slide as a whole in {percent(share)} of the increments" if share else NO_SLIDING
 
 
 def _draw_normal_force(

@@ -44,14 +44,14 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
     structure = structure_of(case)
     if not isinstance(case, FiniteElementCase):
         raise UserError(
-            f"{name}: structure.kind: {structure.name} has no finite elements "
-            "to take loads from; allowed: a case with a structure of ours, such as dovetail"
+            f"{name}: structure.kind: {structure.name} has no finite elements to take loads from; "
+            "allowed: a dovetail or a mesh"
         )
     terms = case.every_terms
     if any(other != terms[0] for other in terms[1:]):
         raise UserError(
             f"{name}: structure.contacts: contacts with materials, friction, wear or grids of "
-            "their own, which a case of resultants cannot have; allowed: all alike"
+            "their own, which a case of resultants cannot have; allowed: the same for all"
         )
     structure.memory(case, 0, 0).check()
     case, choice = structure.choose(case)
@@ -72,8 +72,8 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
     return [
         f"{out / TABLE}: forces, moments and energies of every interface and increment",
         f"{out / FIELDS}: the same with slip, nodes, frames and unworn gaps",
-        f"{out / CASE}: a case that wears under them, constant: fretscale run {out / CASE} --out "
-        "DIR",
+        f"{out / CASE}: a case that wears under them, taken as constant: fretscale run "
+        f"{out / CASE} --out DIR",
         f"Columns, signs, and how other codes write them: {RECIPE}",
     ]
 

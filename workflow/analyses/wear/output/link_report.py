@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from wear.contact.link import StructureLink
+from workflow.case.text.readable import percent
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -29,7 +30,7 @@ def link_summary(link: StructureLink) -> dict[str, Any]:
 def report_link(name: str, link: StructureLink, line: bool, reporter: Reporter) -> None:
     """Log how a contact is linked, and warn if the fit error exceeds the graininess."""
     if not link.corrects:
-        reporter.log(f"{name}: the bodies are taken for half-spaces")
+        reporter.log(f"{name}: the bodies are taken as half-spaces")
         return
     bodies, misfit, graininess = link.quality.tolist()
     axes = "x" if line else "xy"
@@ -38,17 +39,18 @@ def report_link(name: str, link: StructureLink, line: bool, reporter: Reporter) 
         for axis, degree, low, high in zip(axes, link.degrees, *link.region, strict=False)
     )
     reporter.log(
-        f"{name}: the bodies deform by {bodies:.1%} of what half-spaces do beside them; fitted by "
-        f"polynomials {fit}, which leave {misfit:.1%} smooth and {graininess:.1%} grainy"
+        f"{name}: the bodies add {percent(bodies)} to the deformation of half-spaces; fitted by "
+        f"polynomials {fit}, with errors of {percent(misfit)} (smooth) and {percent(graininess)} "
+        "(grainy)"
     )
     if link.coarse:
         why = (
-            "the mesh is too coarse for it"
+            "the mesh is too coarse"
             if link.grainy
-            else "it changes within fewer nodes than a fit can follow"
+            else "the deformation changes within fewer nodes than a fit can follow"
         )
         reporter.warn(
-            f"{name}: the link to the structure leaves {misfit:.1%} smooth and {graininess:.1%} "
-            f"grainy of what half-spaces deform, and pressures may be wrong by as much: {why}; "
-            "refine the mesh of the contact face"
+            f"{name}: the link to the structure has errors of {percent(misfit)} (smooth) and "
+            f"{percent(graininess)} (grainy) of the deformation of half-spaces, and pressures may "
+            f"be wrong by as much: {why}; refine the mesh of the contact face"
         )

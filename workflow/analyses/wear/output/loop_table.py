@@ -61,9 +61,11 @@ COLUMNS = (
     LoopColumn(
         "border_load", "1", "1", "share of P on the grid's outermost cells", extensive=False
     ),
-    LoopColumn("kt_error", "N/mm", "N/mm", "estimated error of kt by grid"),
-    LoopColumn("mu_error", "1", "1", "of mu by grid and increments", extensive=False),
-    LoopColumn("energy_per_loop_error", "N*mm", "mJ", "of energy_per_loop by grid and increments"),
+    LoopColumn("kt_error", "N/mm", "N/mm", "estimated error of kt due to the grid"),
+    LoopColumn("mu_error", "1", "1", "of mu, due to grid and increments", extensive=False),
+    LoopColumn(
+        "energy_per_loop_error", "N*mm", "mJ", "of energy_per_loop, due to grid and increments"
+    ),
 )
 # Share of P that must slip for mu to be the coefficient of friction, not just what is mobilised.
 SLIDES = 1.0 - 1e-6

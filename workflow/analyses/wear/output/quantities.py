@@ -16,7 +16,7 @@ from workflow.shell.output.summary import estimate, number_at, told
 
 # Source of estimated errors in the report: totals of the error budget.
 BUDGET = "all parts of the error budget below"
-LOOP_ERROR = "grid and increments of the loop; not what wear steps leave of the surfaces"
+LOOP_ERROR = "grid and increments of the loop; errors of the worn surfaces are not included"
 STRUCTURE = "structure"
 # Description of element quality, defined as gmsh's gamma.
 QUALITY = "inscribed over circumscribed radius, 1: regular"
@@ -196,4 +196,4 @@ def _left_by_mesh(summary: Summary, path: str) -> dict[str, Any]:
     error = number_at(summary, f"{path}.error")
     if error is not None and error >= 1.0:
         return {"where": "grows as the mesh is refined"}
-    return estimate(summary, f"{path}.error", "what the mesh leaves of the stress")
+    return estimate(summary, f"{path}.error", "error due to the mesh")

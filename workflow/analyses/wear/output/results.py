@@ -48,6 +48,7 @@ from workflow.analyses.wear.worn.worn_structure import (
     resultants_at,
     worn_structure,
 )
+from workflow.case.text.plain import shares
 from workflow.models.structure import StructureLoads
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
@@ -393,7 +394,7 @@ def _lines(outcome: Outcome, summary: dict[str, Any], budget: Budget) -> Iterato
         yield f"  {name}: peak pressure {pressures}; tilt {numbers['tilt']}"
         if contact.stopped is not None:
             yield (
-                f"  {name}: wear has stopped to within {STOPPED:.0%} of depth and volume after "
+                f"  {name}: wear stopped (depth and volume within {shares(STOPPED)}) after "
                 f"{contact.stopped:.3g} cycles"
             )
         yield from (f"  {name}: {line}" for line in sentences(budget[name]))

@@ -34,6 +34,7 @@ from workflow.analyses.wear.stress.body_stress import (
     StressedCycle,
     sections,
 )
+from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact
 from workflow.shell.output.results import ResultsWriter
 from workflow.shell.terminal.reporter import Reporter
@@ -200,7 +201,9 @@ def contact_stresses(
     )
     for stress, (_, cycles) in zip(stresses, contacts, strict=True):
         if cycles[0].faces is None:
-            reporter.log(f"{stress.name}: the stress under it is that of its tractions alone")
+            reporter.log(
+                f"{stress.name}: the stress under the contact is that of its tractions alone"
+            )
         else:
             _report_carried(stress, reporter)
     return stresses
@@ -295,13 +298,13 @@ def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
     worst = unknown.max(axis=0)
     if worst[peak] > STUCK_SHARE:
         reporter.warn(
-            f"up to {worst[peak]:.0%} of the peak load sticks: stress.section lacks its shear, and "
-            f"stress.life that increment's stress: {why}"
+            f"up to {percent(worst[peak])} of the peak load sticks, so stress.section lacks its "
+            f"shear, and stress.life the stress of that increment: {why}"
         )
     if count := int((worst > STUCK_SHARE).sum()):
         reporter.warn(
-            f"stress.life leaves out the stress of {count} of {len(worst)} increments, in which up "
-            f"to {worst.max():.0%} of the load sticks: {why}"
+            f"stress.life leaves out {count} of {len(worst)} increments, in which up to "
+            f"{percent(worst.max())} of the load sticks: {why}"
         )
 
 
@@ -309,15 +312,17 @@ def _report_carried(stress: InterfaceStress, reporter: Reporter) -> None:
     """Warn if the stress carried past a contact is unknown or inaccurate."""
     if not stress.bulk:
         reporter.warn(
-            f"{stress.name}: too few nodes near the contact to tell what the structure carries "
-            "past it: the stress under it is that of its tractions alone; refine the mesh there"
+            f"{stress.name}: too few nodes near the contact to know what the structure carries "
+            "beyond the contact: the stress under it is that of its tractions alone; refine the "
+            "mesh there"
         )
         return
     fits = [carried.rest for moment in stress.moments.values() for carried in moment.carried]
     if any(fit.coarse for fit in fits):
         left = max(fit.residual for fit in fits)
         reporter.warn(
-            f"{stress.name}: what the structure carries past the contact is known but for "
-            f"{left:.1%} of what half-spaces deform, and the stress under it may be wrong by as "
-            "much, twice towards the ends of the face; refine the mesh of the contact face"
+            f"{stress.name}: what the structure carries beyond the contact is uncertain by "
+            f"{percent(left)} of the deformation of half-spaces, and the stress under it may be "
+            "wrong by as much, and twice as much near the ends of the face: refine the mesh of "
+            "the contact face"
         )

@@ -18,6 +18,7 @@ from sa_solver.types import Array
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.output.layout import OVER_ENERGY
 from workflow.analyses.wear.output.loop_table import COLUMNS, SLIDES, write_loop_table
+from workflow.case.text.readable import percent
 from workflow.models.loops import WornLoop
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import ResultsWriter
@@ -86,8 +87,8 @@ def warn_of_border(loops: dict[str, dict[str, Any]], asked: Loops, reporter: Rep
         share = max(loop[when]["border_load"] for when in ("unworn", "worn"))
         if share > 0.0 and asked.normal_force is not None:
             reporter.warn(
-                f"{name}: in the tangential loops the contact reaches the border of its grid "
-                f"({share:.1%} of the force): lower loops.normal_force"
+                f"{name}: in the tangential loops the contact reaches the border of its grid, "
+                f"which carries {percent(share)} of the force: lower loops.normal_force"
             )
 
 
@@ -99,6 +100,6 @@ def loops_sentence(name: str, loops: dict[str, Any], per_length: bool) -> str:
     mu = "mu" if min(first["sliding"], last["sliding"]) >= SLIDES else "mu, only mobilised,"
     return (
         f"{name}: kt {first['kt'] * 1e-3:.4g} -> {last['kt'] * 1e-3:.4g} N/um{per} (within "
-        f"{off:.1%} by the grid), {mu} {first['mu']:.3g} -> {last['mu']:.3g}, energy per "
+        f"{percent(off)} by the grid), {mu} {first['mu']:.3g} -> {last['mu']:.3g}, energy per "
         f"loop {first['energy_per_loop']:.4g} -> {last['energy_per_loop']:.4g} mJ{per}"
     )

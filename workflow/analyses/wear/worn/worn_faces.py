@@ -15,6 +15,7 @@ from workflow.analyses.wear.worn.worn_nodes import (
     worn_displacement,
     write_worn_nodes,
 )
+from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact
 from workflow.models.loads import LoadSource, UserFace
 from workflow.shell.folders.folder import OutputFolder
@@ -42,8 +43,9 @@ def write_worn_faces(
             write_worn_nodes(path, face.numbers, displacement)
             if worn.volume_share < FULL_SHARE:
                 reporter.warn(
-                    f"{stage.name}, body_{face.body}: the nodes carry {worn.volume_share:.1%} of "
-                    "the worn volume: the rest lies outside their face"
+                    f"{stage.name}, body_{face.body}: the nodes carry only "
+                    f"{percent(worn.volume_share)} of the worn volume, as the rest lies outside "
+                    "their face"
                 )
             summary.setdefault(stage.name, {})[f"body_{face.body}"] = {
                 "file": name,

@@ -120,8 +120,8 @@ def _in_plane(points: Array, frame: Frame, line: bool) -> Array:
     extent, off = float(np.ptp(local[:, :2], axis=0).max()), float(np.abs(local[:, 2]).max())
     if off > OFF_PLANE * extent:
         raise FaceError(
-            f"nodes lie up to {off:.3g} mm off the plane of the interface; "
-            "allowed: those of its contact face, in the axes of its frame"
+            f"nodes lie up to {off:.3g} mm off the plane of the interface; allowed: nodes of its "
+            "contact face, in the axes of its frame"
         )
     if line:
         local[:, 1] = 0.0

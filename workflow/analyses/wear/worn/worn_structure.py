@@ -27,6 +27,7 @@ from workflow.analyses.wear.output.datasets import put_face
 from workflow.analyses.wear.recording import reported_stage
 from workflow.analyses.wear.structures.resultants.writing import put_closure
 from workflow.analyses.wear.worn.bolts import BoltTensions
+from workflow.case.text.readable import percent
 from workflow.layout.declared import Arrays
 from workflow.models.contact import FaceContact
 from workflow.models.structure import StructureLoads
@@ -158,13 +159,14 @@ class WornStructure:
         """Return the reason why a stress is unreliable, and a remedy."""
         if not peak.bounded:
             return (
-                "is beside a sharp inward corner, a fillet of fewer than nine elements round the "
-                "circle or the end of a clamped or rigid face, where it grows with every "
-                "refinement: round the corner, refine it, or hold the body farther away"
+                "has no limit as the mesh is refined, because it is next to a sharp inward "
+                "corner, a fillet of fewer than nine elements round the circle or the end of a "
+                "clamped or rigid face: round the corner, refine the fillet, or hold the body "
+                "farther away"
             )
         return (
-            f"has an estimated error of {peak.error:.0%} by the mesh, where {100 * accuracy:g} % "
-            f"may pass: {self.stage.model.finer}"
+            f"has an estimated error of {percent(peak.error)} due to the mesh, above the accuracy "
+            f"of {100 * accuracy:g} %: {self.stage.model.finer}"
         )
 
     def _errors(self) -> dict[str, dict[str, ResultError]]:
@@ -185,7 +187,7 @@ class WornStructure:
             parts = []
             if unworn.notch is not None and worn.notch is not None:
                 error = _known([unworn.notch, worn.notch])
-                left = "without bound" if error is None else f"the mesh leaves {error:.1%}"
+                left = "no limit" if error is None else f"error due to the mesh {percent(error)}"
                 parts.append(f"{_change(unworn.notch, worn.notch)} on the free surface ({left})")
             if worn.peak != worn.notch:
                 where = "on a contact face" if worn.peak.at_contact else "elsewhere"
@@ -330,7 +332,7 @@ def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, S
     try:
         return {moment: formed_mesh(mesh, form) for moment, mesh in meshes.items()}
     except MeshError as error:
-        reporter.warn(f"{error}: worn.msh, points and ParaView files show what is worn alone")
+        reporter.warn(f"{error}: worn.msh, points and ParaView files show only the worn shape")
         return meshes
 
 
@@ -369,8 +371,9 @@ def nonlinearity_sentence(check: NonlinearCheck) -> str:
     """Return a sentence on the effect of geometric nonlinearity at peak load."""
     force, moment = (float(np.abs(part).max()) for part in np.split(check.change, [3], axis=1))
     return (
-        f"geometric nonlinearity at peak load moves P and Q by {force:.2%} of P, moments by "
-        f"{moment:.2%} of P x half a face, slips by {check.slip_change:.1%} of the largest"
+        f"geometric nonlinearity at peak load changes P and Q by {percent(force)} of P, moments "
+        f"by {percent(moment)} of P x half a face, slips by {percent(check.slip_change)} of the "
+        "largest"
     )
 
 

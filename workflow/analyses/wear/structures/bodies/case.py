@@ -63,7 +63,7 @@ FLAT = "flat"
 SHIFTS = "shift_x", "shift_y"
 # Loads that shear a contact other than by moving all of it.
 SHEARING = {"Qx", "Qy", "Mz", "twist", "bulk_stress_1", "bulk_stress_2"}
-TILTS = "of the bodies, held: as they are placed; free: as no moment at all leaves them"
+TILTS = "tilt of the bodies: held: as they are placed; free: as no moment leaves them"
 
 # --- bodies -------------------------------------------------------------------------------------
 
@@ -72,9 +72,13 @@ class Flat(Shape):
     """A flat rectangle with sharp edges on a step: the pad of a specimen."""
 
     shape: Literal["flat"] = entry("flat, or as in contact cases", "flat")
-    half_width: Length = entry("of the rectangle, along x [mm]", "0.5 mm")
-    half_length: Length = entry("of the rectangle, along y [mm]", "0.5 mm")
-    step: Length = entry("from the rectangle back to the body [mm]", "0.1 mm", default=0.1)
+    half_width: Length = entry("half width of the rectangle, along x [mm]", "0.5 mm")
+    half_length: Length = entry("half length of the rectangle, along y [mm]", "0.5 mm")
+    step: Length = entry(
+        "height of the rectangle above the body [mm]",
+        "0.1 mm",
+        default=0.1,
+    )
 
     def height(self, x: Array, y: Array) -> Array:
         on_top = (np.abs(x) < self.half_width) & (np.abs(y) < self.half_length)
@@ -85,8 +89,8 @@ class FlatStrip(Shape):
     """A flat strip with sharp edges on a step: a line contact."""
 
     shape: Literal["flat"] = entry("flat, or as in contact cases", "flat")
-    half_width: Length = entry("of the strip, along x [mm]", "0.5 mm")
-    step: Length = entry("from the strip back to the body [mm]", "0.1 mm", default=0.1)
+    half_width: Length = entry("half width of the strip, along x [mm]", "0.5 mm")
+    step: Length = entry("height of the strip above the body [mm]", "0.1 mm", default=0.1)
 
     def height(self, x: Array, y: Array) -> Array:
         return np.where(np.abs(x) < self.half_width, 0.0, self.step)
@@ -134,9 +138,11 @@ class Reciprocation(Stroke):
     """Body 2 moves back and forth at constant speed under a constant normal force."""
 
     P: PressingForce = entry("normal force [N]", "50 N")
-    stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "20 um")
-    direction: Direction = entry("of the stroke, from x to y [rad]", "0 deg", default=0.0)
-    increments: Increments = entry("equal steps of each way, there and back", 4, default=4)
+    stroke: Length = entry("stroke of body 2, peak to peak, far from the contact [mm]", "20 um")
+    direction: Direction = entry("direction of the stroke, from x to y [rad]", "0 deg", default=0.0)
+    increments: Increments = entry(
+        "number of equal steps of each way, forward and back", 4, default=4
+    )
     tilt: Tilt = entry(TILTS, "held", default="held")
 
     def table(self) -> LoadTable:
@@ -148,8 +154,10 @@ class LineReciprocation(Stroke):
     """Body 2 moves back and forth along x at constant speed under a constant normal force."""
 
     P: PressingLineForce = entry("normal force [N/mm]", "50 N/mm")
-    stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "20 um")
-    increments: Increments = entry("equal steps of each way, there and back", 4, default=4)
+    stroke: Length = entry("stroke of body 2, peak to peak, far from the contact [mm]", "20 um")
+    increments: Increments = entry(
+        "number of equal steps of each way, forward and back", 4, default=4
+    )
     tilt: Tilt = entry(TILTS, "held", default="held")
 
     def table(self) -> LoadTable:
@@ -164,7 +172,8 @@ class ClosedCycle(LegsOrFile[LegT], Generic[LegT]):
     known_by: ClassVar[frozenset[str]] = frozenset({"legs", "file"})
 
     legs: tuple[LegT, ...] = entry(
-        "one after the other, over and over: the first from where the last one ends", default=()
+        "legs, one after the other and repeated: the first begins where the last one ends",
+        default=(),
     )
     tilt: Tilt = entry(f"{TILTS}; unless a moment or tilt is named", "held", default="held")
 
@@ -207,32 +216,32 @@ LineLoadPath = Annotated[
 # --- grids --------------------------------------------------------------------------------------
 
 METHODS = (
-    "normal: every cell slides by all of the stroke; full: slips of the half-space, over the stroke"
+    "normal: every cell slides by the whole stroke; full: slips of the half-space, over the stroke"
 )
 ACCURACY = (
-    "of depth and energy of a cycle that increments may leave with method full, which splits them "
-    "[1]"
+    "error of depth and energy of a cycle that increments may cause with method full, which "
+    "splits them [1]"
 )
-SPLIT = "in parts until they leave {} of depth and energy (contact.accuracy)"
-LINK = "there is no structure to link the contact to: both bodies are half-spaces"
+SPLIT = "split until their error is {} of depth and energy (contact.accuracy)"
+LINK = "there is no structure to link to: both bodies are half-spaces"
 
 
 class BodiesWear(WearSection):
     """Wear laws of two bodies, and length of the run."""
 
-    cycles: Cycles = entry("of the whole run [1]", 1e5)
+    cycles: Cycles = entry("number of cycles of the whole run [1]", 1e5)
 
 
 class WearGrid(ContactSection):
     """Half-space solution on a grid centred on body 2, which moves with it."""
 
     grid: tuple[GridCells, GridCells] = entry(
-        "cells along x, along y; of heights as many as their file has",
+        "number of cells along x, along y; for heights as many as in their file",
         [128, 128],
         default=(128, 128),
     )
     size: tuple[Length, Length] = entry(
-        "of the grid along x, along y, room for the stroke included [mm]", ["1 mm", "1 mm"]
+        "size of the grid along x, along y, with room for the stroke [mm]", ["1 mm", "1 mm"]
     )
     method: Literal["normal", "full"] = entry(METHODS, "normal", default="normal")
     accuracy: Accuracy = entry(ACCURACY, "2 %", default=0.02)
@@ -243,9 +252,9 @@ class LineWearGrid(ContactSection):
     """Half-plane solution on strips centred on body 2, which move with it."""
 
     grid: LineCells = entry(
-        "strips along x; of heights as many as their file has", 512, default=(512, 1)
+        "number of cells along x; for heights as many as in their file", 512, default=(512, 1)
     )
-    size: Length = entry("of the grid along x, room for the stroke included [mm]", "2 mm")
+    size: Length = entry("size of the grid along x, with room for the stroke [mm]", "2 mm")
     method: Literal["normal", "full"] = entry(METHODS, "normal", default="normal")
     accuracy: Accuracy = entry(ACCURACY, "2 %", default=0.02)
     link: Literal["half_space"] = entry(LINK, "half_space", default="half_space")
@@ -329,7 +338,9 @@ class BodiesWearCase(TwoBodiesWearCase):
 
     title: Title = entry("one line", "Ball that wears on a flat")
     structure: BodiesOfArea = entry("the bodies: no finite elements; body 2 has the form")
-    load_path: LoadPath = entry("of body 2 on body 1: a stroke, or legs or a file of a cycle")
+    load_path: LoadPath = entry(
+        "motion of body 2 on body 1: a stroke, or legs or a file of a cycle"
+    )
     contact: WearGrid = entry("half-space grid")
 
 
@@ -342,7 +353,7 @@ class LineBodiesWearCase(TwoBodiesWearCase):
     title: Title = entry("one line", "Cylinder that wears on a flat")
     structure: BodiesOfLine = entry("the bodies: no finite elements; body 2 has the form")
     load_path: LineLoadPath = entry(
-        "of body 2 on body 1, forces per length: a stroke, or legs or a file of a cycle"
+        "motion of body 2 on body 1, forces per length: a stroke, or legs or a file of a cycle"
     )
     contact: LineWearGrid = entry("half-plane grid")
 
@@ -363,14 +374,14 @@ def _check(case: TwoBodiesWearCase) -> None:
         if forces or not given.keys() & SHIFTS:
             wrong = f"has {', '.join(forces)}" if forces else "moves nothing along the face"
             raise disagreement(
-                f"normal lets every cell slide by all of the motion, but load_path {wrong}; "
+                f"normal lets every cell slide by the whole motion, but load_path {wrong}; "
                 f"allowed: full, or no more than {', '.join(SHIFTS)} along the face",
                 "contact.method",
             )
     tilted = sorted(given.keys() & {"approach", "tilt_x", "tilt_y"})
     if case.loops.wanted and (tilted or (path.tilt == "held" and given.keys() & {"Mx", "My"})):
         raise disagreement(
-            f"loops run under a normal force, level or free to tilt, but load_path has "
+            "loops run under a normal force, level or free to tilt, but load_path has "
             f"{', '.join(tilted) or 'moments beside a tilt that is held'}; allowed: no loops",
             "loops",
         )

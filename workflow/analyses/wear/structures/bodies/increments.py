@@ -28,6 +28,7 @@ from workflow.analyses.wear.structures.bodies.case import Stroke, TwoBodiesWearC
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.changing import changed
+from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact
 
 AnyCase = TypeVar("AnyCase", bound=TwoBodiesWearCase)
@@ -55,9 +56,9 @@ def choose_parts(case: AnyCase) -> tuple[AnyCase, dict[str, Any] | None]:
     if not np.isfinite(error) or (parts == 1 and error <= accuracy):
         return case, None
     why = (
-        f"{parts * rows} in a cycle leave {error:.2%} of the depth and energy of the unworn "
-        f"cycle, of {accuracy:.2%} allowed (contact.accuracy); the case's own {rows} leave "
-        f"{tried[1]:.2%}"
+        f"{parts * rows} in a cycle cause an error of {percent(error)} of depth and energy of the "
+        f"unworn cycle, of {percent(accuracy)} allowed (contact.accuracy); the {rows} of the case "
+        f"cause {percent(tried[1])}"
     )
     probe = {
         "parts": list(tried),

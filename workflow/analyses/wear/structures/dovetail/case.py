@@ -61,46 +61,53 @@ class DovetailSection(Section):
     """Blade root in a disk sector, in contact along two flanks (dovetail attachment)."""
 
     in_schema: ClassVar[Mapping[str, Any]] = together("end_width", "end_radius")
-    kind: Literal["dovetail"] = entry("what the structure is", "dovetail")
+    kind: Literal["dovetail"] = entry("kind of structure", "dovetail")
     dimension: Literal[2, 3] = entry(
         "3, or 2: the section in the middle of the slot in plane strain, loads per length",
         3,
         default=3,
     )
-    flank_angle: FlankAngle = entry("between the flank and the radial axis [rad]", "45 deg")
-    flank_length: Length = entry("flat part of the flank, across the slot [mm]", "8 mm")
+    flank_angle: FlankAngle = entry("angle between the flank and the radial axis [rad]", "45 deg")
+    flank_length: Length = entry(
+        "length of the flat part of the flank, across the slot [mm]", "8 mm"
+    )
     edge_radius: RoundingRadius = entry(
-        "rounding of the two flank edges along the slot [mm]", "30 mm"
+        "radius of the two flank edges along the slot [mm]", "30 mm"
     )
     edge_width: Length = entry("width of each rounded edge, beyond the flat [mm]", "1.5 mm")
     end_radius: RoundingRadius | None = entry(
-        "rounding of the flank at the slot ends; counts for nothing in 2 dimensions [mm]",
+        "radius of the flank at the slot ends; ignored in 2 dimensions [mm]",
         "150 mm",
         default=None,
     )
     end_width: Length | None = entry(
         "width of each rounded end, inside the slot length [mm]", "3 mm", default=None
     )
-    neck_width: Length = entry("blade, between the tops of the flanks [mm]", "20 mm")
-    neck_fillet: Length = entry("blade, radius between neck and flank [mm]", "3 mm")
-    slot_length: Length = entry("of the slot, along its direction [mm]", "60 mm")
-    slot_fillet: Length = entry("disk, radius at the bottom of the slot [mm]", "3 mm")
-    root_depth: Length = entry("blade, below the flanks [mm]", "6 mm")
-    shank_height: Length = entry("blade, from the top of the flanks outwards [mm]", "30 mm")
-    slot_clearance: Length = entry("play under the blade root [mm]", "1 mm")
-    lug_height: Length = entry("disk, above the top of the flanks [mm]", "6 mm")
-    blades: Annotated[int, Whole(3, 1000)] = entry("the sector spans 360°/blades", 24)
-    rim_radius: Length = entry("rotor axis to the top of the flanks [mm]", "250 mm")
+    neck_width: Length = entry("blade: width between the tops of the flanks [mm]", "20 mm")
+    neck_fillet: Length = entry("blade: radius between neck and flank [mm]", "3 mm")
+    slot_length: Length = entry("length of the slot, along its direction [mm]", "60 mm")
+    slot_fillet: Length = entry("disk: radius at the bottom of the slot [mm]", "3 mm")
+    root_depth: Length = entry("blade: depth below the flanks [mm]", "6 mm")
+    shank_height: Length = entry(
+        "blade: height of the shank, from the top of the flanks [mm]", "30 mm"
+    )
+    slot_clearance: Length = entry("clearance under the blade root [mm]", "1 mm")
+    lug_height: Length = entry("disk: height above the top of the flanks [mm]", "6 mm")
+    blades: Annotated[int, Whole(3, 1000)] = entry(
+        "number of blades: the sector spans 360°/blades", 24
+    )
+    rim_radius: Length = entry("radius from the rotor axis to the top of the flanks [mm]", "250 mm")
     disk_height: Length = entry("radial height of the sector below the rim [mm]", "60 mm")
-    skew: Skew = entry("slot direction against the rotor axis [rad]", "0 deg", default=0.0)
+    skew: Skew = entry("angle of the slot to the rotor axis [rad]", "0 deg", default=0.0)
     sides: Literal["guided", "cyclic"] = entry(
-        "of the disk's sector: guided along their planes, or cyclic: as those of the next sectors",
+        "sides of the disk's sector: guided along their planes, or cyclic: moving as those "
+        "of the next sectors",
         "guided",
         default="guided",
     )
     surfaces: MeasuredFlanks | None = entry(
-        "of the flanks as measured, on top of their form, about the middle of each; of dimension "
-        "2 profiles, the same all along the slot",
+        "measured surfaces of the flanks, added to their form, about the middle of each; in "
+        "dimension 2 profiles, the same all along the slot",
         default=None,
     )
 
@@ -131,7 +138,7 @@ class DovetailSection(Section):
     def _plane_is_straight(self) -> DovetailSection:
         if self.dimension == 2 and self.skew != 0.0:
             raise disagreement(
-                "2: a skewed slot is not the same all along; allowed: dimension 3, or skew 0",
+                "2: the sections of a skewed slot differ; allowed: dimension 3, or skew 0",
                 *("dimension", "skew"),
             )
         return self
@@ -140,8 +147,8 @@ class DovetailSection(Section):
     def _sides_are_images(self) -> DovetailSection:
         if self.sides == "cyclic" and self.skew != 0.0:
             raise disagreement(
-                "cyclic: the sides of a skewed slot's sector, which ends in planes, are no images "
-                "of each other; allowed: guided, or skew 0",
+                "cyclic: the sides of a skewed slot's sector, which ends in planes, are not "
+                "images of each other; allowed: guided, or skew 0",
                 *("sides", "skew"),
             )
         return self
@@ -154,7 +161,7 @@ class DovetailSection(Section):
             _require_below(self, "end_width", self.slot_length / 2, "half the slot_length")
         elif self.dimension == 3:
             raise disagreement(
-                "none: without a rounding the pressure has no limit at the slot ends; allowed: "
+                "none: without rounding the pressure has no limit at the slot ends; allowed: "
                 "end_width and end_radius, or dimension 2",
                 *("end_width", "end_radius", "dimension"),
             )
@@ -218,10 +225,14 @@ def _require_below(section: Section, key: str, limit: float, name: str) -> None:
 class MissionOfMix(Section):
     """One of several missions; entries that it does not give are those of ``load_path``."""
 
-    share: Share = entry("of all cycles; the shares add up to 1 [1]", "100 %")
-    rotation_speed: RotationSpeed | None = entry("at the peak [rad/s]", "5000 rpm", default=None)
+    share: Share = entry("share of all cycles; the shares add up to 1 [1]", "100 %")
+    rotation_speed: RotationSpeed | None = entry(
+        "speed at the peak [rad/s]", "5000 rpm", default=None
+    )
     aerodynamic_moment: Moment | None = entry(
-        "at peak speed, about the slot; presses on the intrados [N*mm]", "20 N*m", default=None
+        "moment at peak speed, about the slot; presses on the intrados [N*mm]",
+        "20 N*m",
+        default=None,
     )
 
 
@@ -232,23 +243,25 @@ class LoadPath(Section):
     """
 
     refused: ClassVar[Mapping[str, str]] = {
-        "peak_at": "the first leg of increments, which are [8, 14] where the speed peaks at 8 of 22"
+        "peak_at": "the first leg of increments: [8, 14] where the speed peaks at 8 of 22"
     }
 
     increments: Annotated[tuple[LegIncrements, LegIncrements] | Auto, OrAuto()] = entry(
-        "up to the peak, and down from it; auto: as many as leave no more than wear.tolerance",
+        "increments up to the peak, and down from it; auto: as many as wear.tolerance needs",
         [8, 14],
     )
-    rotation_speed: RotationSpeed = entry("at the peak [rad/s]", "6000 rpm")
-    airfoil_mass: Mass = entry("of the blade outside the model [t]", "0.8 kg")
+    rotation_speed: RotationSpeed = entry("speed at the peak [rad/s]", "6000 rpm")
+    airfoil_mass: Mass = entry("mass of the blade outside the model [t]", "0.8 kg")
     airfoil_radius: Length = entry(
-        "of the airfoil's centre of mass, from the rotor axis [mm]", "400 mm"
+        "radius of the airfoil's centre of mass, from the rotor axis [mm]", "400 mm"
     )
     aerodynamic_moment: Moment = entry(
-        "at peak speed, about the slot; presses on the intrados [N*mm]", "30 N*m", default=0.0
+        "moment at peak speed, about the slot; presses on the intrados [N*mm]",
+        "30 N*m",
+        default=0.0,
     )
     mix: tuple[MissionOfMix, ...] = entry(
-        "missions that take turns; without it there is one", default=()
+        "missions that alternate; without it there is one", default=()
     )
 
     @field_validator("increments", mode="before")
@@ -257,8 +270,8 @@ class LoadPath(Section):
         if type(increments) is int:
             raise PydanticCustomError(
                 "entry",
-                "{count}: of a whole cycle; allowed: up to the peak and down from it, such as "
-                "[8, 14], or auto",
+                "{count}: for a whole cycle; allowed: up to the peak and down from it, such as [8, "
+                "14], or auto",
                 {"count": increments},
             )
         return increments
@@ -300,13 +313,13 @@ class Mesh(Section):
     """Tetrahedra of the structure."""
 
     flank_nodes: tuple[FlankNodes, FlankNodes] = entry(
-        "nodes across the flank, along the slot", [20, 34], default=(20, 34)
+        "number of nodes across the flank, along the slot", [20, 34], default=(20, 34)
     )
-    size: Length = entry("of the elements away from the flanks [mm]", "5 mm", default=5.0)
+    size: Length = entry("size of the elements away from the flanks [mm]", "5 mm", default=5.0)
     notch: Annotated[int, Whole(8, 1000)] = entry(
-        "elements round a full circle of a fillet, whose stress is told", 48, default=48
+        "elements round a full circle of a fillet whose stress is reported", 48, default=48
     )
-    order: Literal[1, 2] = entry("of the tetrahedra, 1 or 2", 1, default=1)
+    order: Literal[1, 2] = entry("order of the tetrahedra, 1 or 2", 1, default=1)
 
     def described(self) -> DovetailMesh:
         """Return the mesh as the model takes it."""
@@ -330,8 +343,8 @@ class DovetailCase(FiniteElementCase):
     mesh: Mesh = entry("finite elements of the structure", default=Mesh())
     wear: DovetailWear = entry("law, length of the run and step")
     fidelity: Literal["fixed", "auto"] = entry(
-        "fixed: as written; auto: dimension, increments, mesh, grid, tolerances, wear steps and "
-        "drift as coarse as probes show that the accuracy allows",
+        "fixed: as written; auto: probes choose dimension, increments, mesh, grid, tolerances, "
+        "wear steps and drift as coarse as the accuracy allows",
         "fixed",
         default="fixed",
     )
@@ -356,7 +369,7 @@ class DovetailCase(FiniteElementCase):
             ("peak load", ", ".join(self._peak_loads())),
         ]
         if self.fidelity == "auto":
-            by_probes = f"2-D or 3-D and how fine, by probes: {shares(self.accuracy)}"
+            by_probes = f"2-D or 3-D and how fine: chosen by probes for {shares(self.accuracy)}"
             rows.append(("fidelity", by_probes))
         return rows
 
@@ -394,8 +407,8 @@ class DovetailCase(FiniteElementCase):
         yield from super().told_of_nodes()
         if self.structure.surfaces is not None and self.structure.dimension == 3:
             yield (
-                "structure.surfaces: the section by which increments are chosen and the error of "
-                "the mesh is estimated is without them"
+                "structure.surfaces: the section that chooses increments and estimates the error "
+                "of the mesh does not have them"
             )
 
     def _flank_grid(self, name: str) -> Grid:
@@ -415,9 +428,9 @@ class DovetailCase(FiniteElementCase):
         arm, moment = 0.5 * self.structure.neck_width, abs(self.load_path.aerodynamic_moment)
         if moment > arm * self._pull:
             yield (
-                f"load_path.aerodynamic_moment: {plain(moment, 'N*mm')} would lift the "
-                f"blade off a flank: more than the pull of {plain(self._pull, 'N')} on half of "
-                f"the neck, {plain(arm, 'mm')}"
+                f"load_path.aerodynamic_moment: {plain(moment, 'N*mm')} would lift the blade off "
+                f"a flank: it exceeds the pull of {plain(self._pull, 'N')} on half of the neck, "
+                f"{plain(arm, 'mm')}"
             )
         yield from self.surface_doubts()
 
@@ -429,7 +442,7 @@ class DovetailCase(FiniteElementCase):
     def _ends_are_probed(self) -> DovetailCase:
         if self.fidelity == "auto" and self.structure.end_width is None:
             raise disagreement(
-                "auto: looks at three dimensions too, for which structure.end_width and "
+                "auto: compares two and three dimensions, for which structure.end_width and "
                 "structure.end_radius are needed; allowed: these, or fidelity fixed",
                 *("fidelity", "structure.end_width", "structure.end_radius"),
             )
@@ -447,7 +460,7 @@ class DovetailCase(FiniteElementCase):
             return self
         if self.fidelity == "auto":
             raise disagreement(
-                "auto: looks at two dimensions and three, and surfaces as measured are of one of "
+                "auto: compares two and three dimensions, but measured surfaces belong to one of "
                 "them; allowed: fidelity fixed, or no structure.surfaces",
                 *("fidelity", SURFACES),
             )

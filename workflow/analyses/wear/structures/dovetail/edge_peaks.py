@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from sa_solver.reference.flat_rounded import FlatRoundedPunch
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact
 
 # Share of the edge peak, from a closed form, that the grid may miss.
@@ -17,7 +18,7 @@ def warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[st
     for edge, error in edge_peak_errors(case, stage, load).items():
         if abs(error) > PEAK_ERROR:
             yield (
-                f"{stage.name}: the grid misses {abs(error):.0%} of the pressure peak at the "
+                f"{stage.name}: the grid misses {percent(abs(error))} of the pressure peak at the "
                 f"{edge}: refine contact.grid or increase structure.{edge}_radius"
             )
 

@@ -21,10 +21,11 @@ class FlankSurfaces(SurfacesOfTwo):
     in_schema: ClassVar[Mapping[str, Any]] = one_of("disk", "blade")
 
     disk: MeasuredSurface | None = entry(
-        "of its flank, seen from the slot: columns along y of the flank's frame", default=None
+        "surface of the disk's flank, seen from the slot: columns along y of the flank's frame",
+        default=None,
     )
     blade: MeasuredSurface | None = entry(
-        "of its flank, seen from outside the root: columns against y", default=None
+        "surface of the blade's flank, seen from outside the root: columns against y", default=None
     )
 
 

@@ -82,30 +82,32 @@ class ImportedStructure(Section):
         "order": "of the elements; allowed: as mesh.order",
     }
 
-    kind: Literal["mesh"] = entry("what the structure is", "mesh")
+    kind: Literal["mesh"] = entry("kind of structure", "mesh")
     file: Annotated[str, MeshFile()] = entry(
         "mesh (.msh, .inp, .vtu, ...) or CAD (.step, .brep)", "joint.msh"
     )
     length_unit: LengthName | None = entry(
-        "of the file: mm, um, cm, m, in or ft; without it the one that the file states, or mm",
+        "length unit of the file: mm, um, cm, m, in or ft; without it that of the file, or mm",
         "m",
         default=None,
     )
     body_1: Name = entry("name in the file of the lower, fixed body", "disk")
     body_2: Name = entry("name in the file of the upper, moving body", "blade")
-    other_bodies: tuple[OtherBody, ...] = entry("beside body 1 and body 2", default=())
-    contacts: tuple[ContactPairSection, ...] = entry("faces that meet", min_length=1)
-    supports: tuple[SupportSection, ...] = entry("what is held", min_length=1)
-    loads: tuple[Load, ...] = entry("what is applied", min_length=1)
+    other_bodies: tuple[OtherBody, ...] = entry("bodies other than body 1 and body 2", default=())
+    contacts: tuple[ContactPairSection, ...] = entry("pairs of faces in contact", min_length=1)
+    supports: tuple[SupportSection, ...] = entry("held boundaries", min_length=1)
+    loads: tuple[Load, ...] = entry("applied loads", min_length=1)
     cyclic: tuple[CyclicCuts, ...] = entry(
-        "cuts of bodies that are a sector of a wheel, tied to each other", default=()
+        "cuts of bodies that are one sector of a wheel, tied to each other", default=()
     )
 
     @model_validator(mode="after")
     def _names_differ(self) -> ImportedStructure:
         names = [pair.name for pair in self.contacts]
         if len(set(names)) < len(names):
-            raise disagreement("two contacts of one name; allowed: names that differ", "contacts")
+            raise disagreement(
+                "two contacts of the same name; allowed: different names", "contacts"
+            )
         for index, name in enumerate(names):
             check_interface_name(name, f"contacts.{index}.name")
         if self.body_1 == self.body_2:
@@ -123,7 +125,7 @@ class ImportedStructure(Section):
             for name in pair.bodies or ():
                 if name not in self.names:
                     raise disagreement(
-                        f"no body {name}; allowed: {', '.join(self.names)}, or one more of "
+                        f"no body {name}; allowed: {', '.join(self.names)}, or list it in "
                         "structure.other_bodies",
                         f"contacts.{index}.bodies",
                     )
@@ -131,7 +133,9 @@ class ImportedStructure(Section):
         for index, body in enumerate(self.names):
             if body not in touched:
                 key = f"other_bodies.{index - 2}.name" if index > 1 else f"body_{index + 1}"
-                raise disagreement(f"{body}: in no contact; allowed: bodies that touch others", key)
+                raise disagreement(
+                    f"{body}: in no contact; allowed: bodies in contact with others", key
+                )
         return self
 
     @property
@@ -187,8 +191,12 @@ def _stamp(file: str) -> Stamp:
 class Elements(Section):
     """Elements of the structure: those of a mesh file, or generated for CAD shapes."""
 
-    size: Length | None = entry("for CAD files only [mm]", "2 mm", default=None)
-    order: Literal[1, 2] = entry("of the elements; 2 has the file's midside nodes", 1, default=1)
+    size: Length | None = entry(
+        "size of the elements, for CAD files only [mm]", "2 mm", default=None
+    )
+    order: Literal[1, 2] = entry(
+        "order of the elements; 2 uses the file's midside nodes", 1, default=1
+    )
 
 
 class MeshMaterials(TwoBodies[MeshMaterial]):
@@ -226,7 +234,7 @@ class MeshCase(FiniteElementCase):
     def loads_outline(self) -> list[tuple[str, str]]:
         structure, path = self.structure, self.load_path
         cycles = f", {len(path.mix)} cycles mixed" if path.mix else ""
-        before = f", those before it in {path.cycle_from - 1} legs" if path.cycle_from > 1 else ""
+        before = f", the first {path.cycle_from - 1} legs run once" if path.cycle_from > 1 else ""
         imported = structure.read(self.mesh.size)
         mesh = structure.mesh(self.mesh.size, self.mesh.order)
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in mesh.bodies]
@@ -256,9 +264,9 @@ class MeshCase(FiniteElementCase):
         imported = self.structure.read(self.mesh.size)
         if left := imported.left:
             yield (
-                f"structure.file: {counted(len(left), 'line')} with loads, supports, contact or "
-                f"materials not taken over, the first {left[0]}; all of them: fretscale describe, "
-                "as a case: fretscale describe --case"
+                f"structure.file: {counted(len(left), 'line')} with loads, supports, contacts or "
+                f"materials not used, the first is {left[0]}; fretscale describe lists all, and "
+                "--case writes them as a case"
             )
         yield from size_doubts(imported, self.solids, self.structure.loads)
         mesh = self.structure.mesh(self.mesh.size, self.mesh.order)
@@ -272,10 +280,10 @@ class MeshCase(FiniteElementCase):
     def _size_is_for_cad(self) -> MeshCase:
         shapes, size = Path(self.structure.file).suffix.lower() in CAD, self.mesh.size
         if shapes and size is None:
-            raise disagreement("missing; allowed: a size, to mesh a CAD file with", "mesh.size")
+            raise disagreement("missing; allowed: an element size for the CAD file", "mesh.size")
         if not shapes and size is not None:
             raise disagreement(
-                f"{size:g} mm: the file is a mesh already; allowed: none, or a file of "
+                f"{size:g} mm: the file already is a mesh; allowed: no size, or a file of "
                 f"{', '.join(CAD)}",
                 "mesh.size",
             )
@@ -310,7 +318,7 @@ class MeshCase(FiniteElementCase):
         asked = self.nonlinearity.asked
         if asked and self.structure.other_bodies:
             raise disagreement(
-                "known of two bodies, the first of them held; allowed: leave it out, or no "
+                "only for two bodies, the first of them held; allowed: leave it out, or no "
                 "structure.other_bodies",
                 *(f"nonlinearity.{key}" for key in asked),
             )
@@ -324,7 +332,7 @@ class MeshCase(FiniteElementCase):
             for key, (_, solid) in self._keyed_solids.items():
                 if solid.density is None:
                     raise disagreement(
-                        f"missing, and a load of {load.kind} acts on the mass; allowed: mass per "
+                        f"missing, but a load of {load.kind} acts on the mass; allowed: mass per "
                         "volume [t/mm^3], such as 4430 kg/m^3",
                         f"{key}.density",
                         key,
@@ -467,7 +475,7 @@ class MeshCase(FiniteElementCase):
         slices = [name for name, share in made.held_faces.items() if share == 1.0]
         if slices and made.dimension == 3:
             raise disagreement(
-                f"all nodes of {slices[0]} are held along it, as in a slice in plane strain, and "
+                f"all nodes of {slices[0]} are held along it, as in a slice in plane strain, but "
                 "its half-space would be a strip as wide as the slice; allowed: the section as a "
                 "plane mesh",
                 "structure.supports",

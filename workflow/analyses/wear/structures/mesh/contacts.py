@@ -32,15 +32,15 @@ class MeshMaterial(Solid):
         default=None,
     )
     expansion: Expansion | None = entry(
-        "linear thermal, for loads of temperature [1/K]", "8.6e-6 1/K", default=None
+        "linear thermal expansion, for loads of temperature [1/K]", "8.6e-6 1/K", default=None
     )
 
 
 class OtherBody(Section):
     """A body in addition to body 1 and body 2."""
 
-    name: Name = entry("in the file", "bolt")
-    material: MeshMaterial = entry("of the body")
+    name: Name = entry("name of the body in the file", "bolt")
+    material: MeshMaterial = entry("material of the body")
 
 
 class ContactFriction(EvolvingFriction):
@@ -56,32 +56,36 @@ class ContactWear(Laws, TwoBodies[BodyWear]):
 class ContactPairSection(Section):
     """Two faces that meet; their meshes need not match."""
 
-    name: Name = entry("of the interface in all results", "pad")
-    face_1: Faces = entry("boundary of body 1, or several that are one face together", "disk_top")
+    name: Name = entry("name of the interface in all results", "pad")
+    face_1: Faces = entry("boundary of body 1, or several that form one face", "disk_top")
     face_2: Faces = entry("boundary of body 2, or several", "blade_foot")
     x: Direction = entry(
-        "direction in which body 2 would slide under the load; x of the interface frame [1]",
+        "direction in which body 2 would slide under the load, x of the interface frame [1]",
         [1.0, 0.0, 0.0],
     )
-    gap: Gap | None = entry("of the unloaded bodies, beside that of their meshes", default=None)
+    gap: Gap | None = entry(
+        "gap of the unloaded bodies, added to that of their meshes", default=None
+    )
     surfaces: MeasuredSurfaces | None = entry(
-        "as measured, on top of gap and meshes: rows along x of the contact, about the middle of "
-        "its grid",
+        "measured surfaces, added to gap and meshes: rows along x of the contact, about the "
+        "middle of its grid",
         default=None,
     )
     bodies: tuple[Name, Name] | None = entry(
-        "body 1 and body 2 of this contact; without it those of the structure",
+        "bodies of this contact; without it body 1 and body 2 of the structure",
         ["disk", "blade"],
         default=None,
     )
     friction: ContactFriction | None = entry(
-        "of this contact; without it that of all", default=None
+        "friction of this contact; without it that of all", default=None
     )
     wear: ContactWear | None = entry(
-        "laws of this contact's bodies; without it those of all", default=None
+        "wear laws of this contact's bodies; without it those of all", default=None
     )
     grid: FaceCells | None = entry(
-        "cells along x, along y of this contact; without it contact.grid", [64, 64], default=None
+        "number of cells along x, along y of this contact; without it contact.grid",
+        [64, 64],
+        default=None,
     )
 
     @model_validator(mode="after")
@@ -95,7 +99,7 @@ class ContactPairSection(Section):
         for key in ("face_1", "face_2"):
             names = getattr(self, key)
             if not names:
-                raise disagreement("none; allowed: a boundary, or several", key)
+                raise disagreement("none; allowed: one boundary or several", key)
             if len(set(names)) < len(names):
                 raise disagreement("a boundary twice; allowed: each once", key)
         return self

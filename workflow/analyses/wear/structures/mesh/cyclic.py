@@ -33,9 +33,9 @@ class CyclicCuts(Section):
     0).
     """
 
-    low: Boundaries = entry("boundary of one cut of a body, or several that are one", "disk_low")
-    high: Boundaries = entry("boundary of its other cut, or several", "disk_high")
-    sectors: Annotated[int, Whole(2, 10_000)] = entry("equal ones that the wheel has", 24)
+    low: Boundaries = entry("boundary of one cut of a body, or several that form one", "disk_low")
+    high: Boundaries = entry("boundary of the other cut, or several", "disk_high")
+    sectors: Annotated[int, Whole(2, 10_000)] = entry("number of equal sectors of the wheel", 24)
     axis: Direction = entry("direction of the axis [1]", [0.0, 1.0, 0.0], default=(0.0, 1.0, 0.0))
     through: tuple[Coordinate, Coordinate, Coordinate] = entry(
         "a point on the axis [mm]", [0.0, 0.0, 0.0], default=(0.0, 0.0, 0.0)
@@ -45,9 +45,11 @@ class CyclicCuts(Section):
     def _is_complete(self) -> CyclicCuts:
         for key in ("low", "high"):
             if not getattr(self, key):
-                raise disagreement("none; allowed: a boundary, or several", key)
+                raise disagreement("none; allowed: one boundary or several", key)
         if both := sorted(set(self.low) & set(self.high)):
-            raise disagreement(f"{both[0]} is both cuts; allowed: two boundaries", "high", "low")
+            raise disagreement(
+                f"{both[0]} is on both cuts; allowed: different boundaries", "high", "low"
+            )
         return self
 
     def described(self) -> fe.Cyclic:
@@ -64,7 +66,7 @@ class CyclicCuts(Section):
         low, high = (" + ".join(names) for names in (self.low, self.high))
         parts = []
         for pair in (pair for cuts in sector_cuts(mesh, [self.described()]) for pair in cuts):
-            meet = "match node to node" if pair.matched else "do not match, tied by a mortar"
+            meet = "match node to node" if pair.matched else "do not match and are tied by a mortar"
             off = f", {1e3 * pair.apart:.2g} µm off" if pair.apart > EXACT else ""
             parts.append(f"{low} and {high} {meet}{off}")
         return f"one of {self.sectors}: {', '.join(parts)}"

@@ -23,13 +23,13 @@ def elements_outline(mesh: StructureMesh, imported: ImportedMesh, order: int) ->
     if order == 1:
         if any(known.values()):
             yield (
-                "of order 1, straight between their corners: midside nodes give contact faces "
-                "their form and nothing else; mesh.order: 2 takes them"
+                "order 1, with straight edges: midside nodes only give contact faces their form; "
+                "mesh.order: 2 uses them as elements"
             )
         return
     for name, found in known.items():
         if found is None:
-            yield f"{name} of order 2, straight: the file has no midside nodes of it"
+            yield f"{name} of order 2, straight: the file has no midside nodes for it"
         elif not found.curved:
             yield f"{name} of order 2, straight: its midside nodes are in the middle of edges"
         else:
@@ -50,8 +50,8 @@ def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[str
             continue
         if found.straightened:
             yield (
-                f"{body.name}: midside nodes fold elements, of which "
-                f"{counted(found.straightened, 'edge')} of {found.edges} are taken straight; "
+                f"{body.name}: midside nodes fold some elements, so "
+                f"{counted(found.straightened, 'edge')} of {found.edges} are taken as straight: "
                 "refine the mesh where it bends"
             )
 
@@ -65,6 +65,6 @@ def apart(mesh: StructureMesh, interface: Interface) -> str:
         return ""
     return (
         f"{interface.name}: its faces meet node to node, but their midside nodes are up to "
-        f"{1e3 * between:.3g} µm apart: the gap there is taken as none; give both faces the same, "
-        "or take mesh.order: 1"
+        f"{1e3 * between:.3g} µm apart; the gap there is taken as zero: give both faces the "
+        "same midside nodes, or take mesh.order: 1"
     )

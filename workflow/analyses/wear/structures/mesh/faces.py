@@ -30,7 +30,10 @@ def outline_of(mesh: StructureMesh, interface: Interface, gap: Section | None) -
     if interface.planes:
         x, y = face_size(interface)
         whole = f"{x:.4g} mm" if interface.line else f"{x:.4g} x {y:.4g} mm"
-        cut = f"; cut by {planes_of_symmetry(interface.planes)}, on a grid over the whole, {whole}"
+        cut = (
+            f"; cut by {planes_of_symmetry(interface.planes)}, on a grid over the whole face, "
+            f"{whole}"
+        )
     return (
         f"{interface.name}, {len(interface)} nodes that {meet}, {area}{_beside(mesh, interface)}, "
         f"gap of the meshes {low:.3g} to {high:.3g} mm{_curved(interface)}{more}{cut}"
@@ -82,8 +85,9 @@ def hardly_met(mesh: StructureMesh, interface: Interface) -> str:
     if shared >= WHOLE * min(whole):
         return ""
     return (
-        f"{interface.name}: its faces share {shared:.4g} {_unit(interface)} of {whole[0]:.4g} and "
-        f"{whole[1]:.4g}; if one is in several parts, name them all, as in face_2: [a, b]"
+        f"{interface.name}: its faces share only {shared:.4g} {_unit(interface)} of "
+        f"{whole[0]:.4g} and {whole[1]:.4g}: if a face has several parts, name them all, as in "
+        "face_2: [a, b]"
     )
 
 
@@ -96,7 +100,8 @@ def check_mirrored(gap: Gap, planes: Sequence[int], key: str) -> None:
         apart = np.abs(heights - np.flip(heights, axis)).max()
         if apart > MIRRORED * np.ptp(heights):
             raise disagreement(
-                f"{gap.file}: not the same on both sides of {planes_of_symmetry([axis])}, by up to "
-                f"{apart:.3g} mm; allowed: heights that are, over the whole face, or a mesh of it",
+                f"{gap.file}: not symmetric about {planes_of_symmetry([axis])}, it differs by up "
+                f"to {apart:.3g} mm; allowed: symmetric heights over the whole face, or a mesh of "
+                "it",
                 key,
             )

@@ -15,9 +15,10 @@ from workflow.case.sections import Section, disagreement, entry
 class CycleOfMix(Section):
     """One of several cycles, with a factor on every load."""
 
-    share: Share = entry("of all cycles; the shares add up to 1 [1]", "100 %")
+    share: Share = entry("share of all cycles; the shares add up to 1 [1]", "100 %")
     factors: tuple[Factor, ...] = entry(
-        "of every load, in the order of structure.loads; of the speed for a rotation [1]", [1.0]
+        "factor of every load, in the order of structure.loads; of the speed for a rotation [1]",
+        [1.0],
     )
 
 
@@ -25,16 +26,16 @@ class Legs(Section):
     """Load path in which every load varies linearly along each leg; the last legs are one cycle."""
 
     increments: Annotated[tuple[Annotated[int, Whole(1, 10_000)], ...] | Auto, OrAuto()] = entry(
-        "of each leg; auto: as many as leave no more than wear.tolerance", [8, 14]
+        "increments of each leg; auto: as many as wear.tolerance needs", [8, 14]
     )
     cycle_from: Annotated[int, Whole(1, 1000)] = entry(
-        "first leg of the cycle; those before it are passed once", 1, default=1
+        "first leg of the cycle; the legs before it run once", 1, default=1
     )
     peak_leg: Annotated[int, Whole(1, 1000)] = entry(
-        "leg of the cycle at whose end the load peaks: stress is shown there", 1, default=1
+        "leg of the cycle that ends at peak load, at which stress is shown", 1, default=1
     )
     mix: tuple[CycleOfMix, ...] = entry(
-        "cycles that take turns, all on these legs, the one to show first; without it there is one",
+        "cycles that alternate, all on these legs, the one to show first; without it there is one",
         default=(),
     )
 

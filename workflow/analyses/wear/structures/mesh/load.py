@@ -20,7 +20,7 @@ Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 
 def _directed(components: tuple[float, ...]) -> tuple[float, ...]:
     if not any(components):
-        raise PydanticCustomError("entry", "no direction; allowed: one that is not zero")
+        raise PydanticCustomError("entry", "no direction; allowed: a vector that is not zero")
     return components
 
 
@@ -39,7 +39,7 @@ class MeshLoad(Section):
 
     kind: str  # first in the section; each load narrows it to its own name
     path: tuple[Factor, ...] = entry(
-        "factor of the load at the end of each leg of load_path; from 0, linearly [1]", [1.0, 0.0]
+        "factor of the load at the end of each leg of load_path; linear from 0 [1]", [1.0, 0.0]
     )
 
     @property

@@ -38,7 +38,7 @@ MOTIONS = "x", "y", "z", "rotation_x", "rotation_y", "rotation_z"
 Motion = Annotated[str, Word(MOTIONS)]
 Tie = Literal["averaged", "rigid"]
 TIE: Any = entry(
-    "of the point to the boundary; averaged: this stays free to deform and follows by least "
+    "link of the point to the boundary; averaged: it stays free to deform and follows by least "
     "squares; rigid: it keeps its form",
     "averaged",
     default="averaged",
@@ -50,7 +50,7 @@ class PressureLoad(MeshLoad):
 
     kind: Literal["pressure"] = entry(KINDS, "pressure")
     group: Name = entry("boundary", "blade_top")
-    pressure: PressureValue = entry("into the body [MPa]", "10 MPa")
+    pressure: PressureValue = entry("pressure into the body [MPa]", "10 MPa")
 
     def described(self) -> fe.Pressure:
         """Return the load as the structure takes it."""
@@ -65,10 +65,10 @@ class ForceLoad(MeshLoad):
     kind: Literal["force"] = entry(KINDS, "force")
     group: Name = entry("boundary", "blade_top")
     force: tuple[ForceComponent, ForceComponent, ForceComponent] = entry(
-        "along the global axes; in the plane per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
+        "force along the global axes; in two dimensions per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
     )
     at: tuple[Coordinate, Coordinate, Coordinate] | None = entry(
-        "the point it acts at, tied to the boundary; its centroid if not given [mm]",
+        "point at which it acts, tied to the boundary; without it its centroid [mm]",
         [0.0, 0.0, "50 mm"],
         default=None,
     )
@@ -88,7 +88,7 @@ class MomentLoad(MeshLoad):
     kind: Literal["moment"] = entry(KINDS, "moment")
     group: Name = entry("boundary", "blade_top")
     moment: tuple[MomentComponent, MomentComponent, MomentComponent] = entry(
-        "about the global axes; in the plane about y and per length, N [N mm]",
+        "moment about the global axes; in two dimensions about y and per length, N [N mm]",
         [0.0, "5 N m", 0.0],
     )
     tie: Tie = TIE
@@ -110,7 +110,7 @@ class DisplacementLoad(MeshLoad):
     kind: Literal["displacement"] = entry(KINDS, "displacement")
     group: Name = entry("boundary", "blade_top")
     displacement: tuple[DisplacementComponent, DisplacementComponent, DisplacementComponent] = (
-        entry("along the global axes [mm]", ["10 um", 0.0, 0.0])
+        entry("displacement along the global axes [mm]", ["10 um", 0.0, 0.0])
     )
 
     @model_validator(mode="after")
@@ -140,15 +140,19 @@ class RemoteDisplacementLoad(MeshLoad):
     group: Name = entry("boundary", "blade_top")
     at: tuple[Coordinate, Coordinate, Coordinate] = entry("the point [mm]", [0.0, 0.0, "50 mm"])
     displacement: tuple[DisplacementComponent, DisplacementComponent, DisplacementComponent] = (
-        entry("of the point along the global axes [mm]", ["10 um", 0.0, 0.0], default=(0, 0, 0))
+        entry(
+            "displacement of the point along the global axes [mm]",
+            ["10 um", 0.0, 0.0],
+            default=(0, 0, 0),
+        )
     )
     rotation: tuple[Angle, Angle, Angle] = entry(
-        "about the global axes; in the plane about y [rad]",
+        "rotation about the global axes; in two dimensions about y [rad]",
         [0.0, "0.1 deg", 0.0],
         default=(0, 0, 0),
     )
     free: tuple[Motion, ...] = entry(
-        "of x, y, z, rotation_x, rotation_y and rotation_z those that are not imposed",
+        "components of x, y, z, rotation_x, rotation_y and rotation_z that are not imposed",
         ["z"],
         default=(),
     )
@@ -159,7 +163,7 @@ class RemoteDisplacementLoad(MeshLoad):
         if len(set(self.free)) < len(self.free):
             raise disagreement("a component twice; allowed: each once", "free")
         if len(self.free) == len(MOTIONS):
-            raise disagreement("all six; allowed: five or fewer, or no such load", "free")
+            raise disagreement("all six; allowed: at most five, or no such load", "free")
         for name, size in zip(MOTIONS, (*self.displacement, *self.rotation), strict=True):
             if name in self.free and size:
                 key = "rotation" if name.startswith("rotation") else "displacement"
@@ -208,7 +212,7 @@ class AccelerationLoad(MeshLoad):
 
     kind: Literal["acceleration"] = entry(KINDS, "acceleration")
     acceleration: tuple[AccelerationComponent, AccelerationComponent, AccelerationComponent] = (
-        entry("along the global axes [mm/s^2]", [0.0, 0.0, "9.81 m/s^2"])
+        entry("acceleration along the global axes [mm/s^2]", [0.0, 0.0, "9.81 m/s^2"])
     )
 
     def described(self) -> fe.Acceleration:

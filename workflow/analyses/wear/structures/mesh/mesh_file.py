@@ -66,8 +66,9 @@ def size_doubts(
         yield f"structure.length_unit: {_unusual(imported, side)}"
     elif imported.unit.name == "m" and imported.unit.source != GIVEN:
         yield (
-            f"structure.length_unit: lengths are {imported.unit}, which makes bodies of "
-            f"{plain(side, 'mm', 4)}; Salome and FreeCAD say so of every mesh: give mm or m here"
+            f"structure.length_unit: lengths are {imported.unit}, which gives bodies of "
+            f"{plain(side, 'mm', 4)}; Salome and FreeCAD write this unit into every mesh: give mm "
+            "or m here"
         )
     yield from _loads(loads, imported, solids)
 
@@ -112,7 +113,7 @@ def _moved(
         if _area(imported, body, load.group) and motion > MOVED * side:
             yield (
                 f"{key}.displacement: moves {body.name}, which is {plain(side, 'mm', 4)} long, by "
-                f"{plain(motion, 'mm', 4)}: is its unit right, and that of the mesh?"
+                f"{plain(motion, 'mm', 4)}: are its unit and that of the mesh right?"
             )
 
 

@@ -29,10 +29,10 @@ Shortening = Annotated[float, Quantity("mm", above=0.0, at_most=100.0)]
 class BoltLoad(MeshLoad):
     """A bolt that is cut across its shank, shortened there, and then held at this length."""
 
-    name: Name = entry("of the bolt in all results", "bolt_1")
-    body: Name = entry("the bolt, with its head and nut", "blade")
+    name: Name = entry("name of the bolt in all results", "bolt_1")
+    body: Name = entry("body of the bolt, with its head and nut", "blade")
     through: tuple[Coordinate, Coordinate, Coordinate] = entry(
-        "a point of the shank: it is cut there, across the axis [mm]", [0.0, 0.0, "2 mm"]
+        "point of the shank at which it is cut, across the axis [mm]", [0.0, 0.0, "2 mm"]
     )
     axis: Direction = entry("direction of the bolt [1]", [0.0, 0.0, 1.0])
 
@@ -63,8 +63,8 @@ class PretensionLoad(BoltLoad):
 
     kind: Literal["pretension"] = entry(KINDS, "pretension")
     force: PressingForce = entry(
-        "at the end of the first leg, of the bolt as far as it is meshed; in the plane per length "
-        "[N]",
+        "tension at the end of the first leg, of the meshed part of the bolt; in two dimensions "
+        "per length [N]",
         "10 kN",
     )
 
@@ -72,7 +72,7 @@ class PretensionLoad(BoltLoad):
     def _is_tightened_first(self) -> PretensionLoad:
         if self.path[0] != 1.0:
             raise disagreement(
-                f"{self.path[0]:g} at the end of the first leg, in which the bolt gets its force; "
+                f"{self.path[0]:g} at the end of the first leg, in which the bolt is tightened; "
                 "allowed: 1 first",
                 "path",
             )
@@ -87,7 +87,7 @@ class ShorteningLoad(BoltLoad):
     """A bolt that is shortened by a given length, and then held at this length."""
 
     kind: Literal["shortening"] = entry(KINDS, "shortening")
-    shortening: Shortening = entry("of the shank [mm]", "20 um")
+    shortening: Shortening = entry("shortening of the shank [mm]", "20 um")
 
 
 def check_bolts(loads: Sequence[MeshLoad], path: Legs, nonlinearity: NonlinearitySection) -> None:
@@ -97,19 +97,19 @@ def check_bolts(loads: Sequence[MeshLoad], path: Legs, nonlinearity: Nonlinearit
     for index, bolt in bolts.items():
         if names.count(bolt.name) > 1:
             raise disagreement(
-                f"two bolts called {bolt.name}; allowed: names that differ",
+                f"two bolts called {bolt.name}; allowed: different names",
                 f"structure.loads.{index}.name",
             )
         if bolt.tension is not None and path.cycle_from < 2:
             raise disagreement(
-                "1: the bolts would be tightened in every cycle; allowed: 2 or more, after the leg "
-                "that tightens them",
+                "1: the bolts would be tightened in every cycle; allowed: 2 or more, after the "
+                "leg that tightens them",
                 "load_path.cycle_from",
                 "load_path",
             )
     if bolts and nonlinearity.asked:
         raise disagreement(
-            "bolts are tightened, as in linear structures; allowed: stiffness: linear without a "
-            "check",
+            "bolts are tightened, which only linear structures can do; allowed: stiffness: "
+            "linear without a check",
             "nonlinearity",
         )

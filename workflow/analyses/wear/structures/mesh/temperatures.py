@@ -29,14 +29,14 @@ NODE, TEMPERATURE = "node", "temperature"
 class _Temperature(MeshLoad):
     """Base of all temperature loads."""
 
-    body: Name | None = entry("that has it; all bodies if not given", "blade", default=None)
+    body: Name | None = entry("body that has it; without it all bodies", "blade", default=None)
 
 
 class TemperatureLoad(_Temperature):
     """Uniform change of temperature of a body, or of all bodies."""
 
     kind: Literal["temperature"] = entry(KINDS, "temperature")
-    change: TemperatureValue = entry("from the stress-free temperature [K]", "100 K")
+    change: TemperatureValue = entry("change from the stress-free temperature [K]", "100 K")
 
     def described(self) -> fe.TemperatureChange:
         """Return the load as the structure takes it."""
@@ -50,11 +50,13 @@ class NodalTemperatureLoad(_Temperature):
 
     kind: Literal["nodal_temperature"] = entry(KINDS, "nodal_temperature")
     file: Annotated[str, File((".csv",))] = entry(
-        "columns node, temperature: one for every node that is a corner of an element [K, or °C "
+        "file with columns node, temperature: one for every corner node of an element [K, or °C "
         "with reference in °C]",
         "temperatures.csv",
     )
-    reference: TemperatureValue = entry("stress-free temperature, counted as in the file [K]", 20.0)
+    reference: TemperatureValue = entry(
+        "stress-free temperature, in the unit of the file [K]", 20.0
+    )
 
     @model_validator(mode="after")
     def _is_read(self) -> NodalTemperatureLoad:
@@ -105,7 +107,7 @@ def check_temperatures(
     for key, (name, expansion) in materials.items():
         if expansion is None and any(load.body in (None, name) for load in heating):
             raise disagreement(
-                f"missing, and a temperature of {name} changes; allowed: linear thermal expansion "
+                f"missing, but a temperature of {name} changes; allowed: linear thermal expansion "
                 "[1/K], such as 12e-6 1/K",
                 f"{key}.expansion",
                 key,
@@ -113,13 +115,13 @@ def check_temperatures(
     for index, load in enumerate(loads):
         if size is not None and isinstance(load, NodalTemperatureLoad):
             raise disagreement(
-                "a CAD file is meshed here, by nodes whose numbers no file of temperatures knows; "
-                "allowed: kind: temperature, or a mesh file",
+                "a CAD file is meshed here, so its node numbers cannot be in a file of "
+                "temperatures; allowed: kind: temperature, or a mesh file",
                 f"structure.loads.{index}.kind",
             )
     if heating and nonlinearity.asked:
         raise disagreement(
-            "temperatures change, whose strains are those of linear structures; allowed: "
+            "temperatures change, and only linear structures have thermal strains; allowed: "
             "stiffness: linear without a check",
             "nonlinearity",
         )

@@ -44,10 +44,10 @@ class FaceFrame(Section):
         "centre of the face [mm]", ["15 mm", "0 mm", "245 mm"]
     )
     x: tuple[Direction, Direction, Direction] = entry(
-        "along the face, as body 2 slides out, of any length [1]", [-1.0, 0.0, 1.0]
+        "direction along the face, in which body 2 slides out, of any length [1]", [-1.0, 0.0, 1.0]
     )
     normal: tuple[Direction, Direction, Direction] = entry(
-        "out of body 1 into body 2, of any length [1]", [-1.0, 0.0, -1.0]
+        "direction out of body 1 into body 2, of any length [1]", [-1.0, 0.0, -1.0]
     )
 
     @model_validator(mode="after")
@@ -56,8 +56,8 @@ class FaceFrame(Section):
         lengths = float(np.linalg.norm(x) * np.linalg.norm(normal))
         if lengths == 0.0 or abs(x @ normal) > PERPENDICULAR * lengths:
             raise disagreement(
-                "x and normal are not at right angles; allowed: perpendicular directions, none of "
-                "length 0",
+                "x and normal are not at right angles; allowed: perpendicular directions, none "
+                "of length 0",
                 "x",
                 "normal",
             )
@@ -81,39 +81,47 @@ class NodeTables(Section):
 class ImportedInterface(Section):
     """An interface of the file, with its own settings."""
 
-    name: Title = entry("as in the file; 'interface' where it has no names", "interface")
-    size: Sizes | None = entry("instead of structure.size [mm]", ["11 mm", "60 mm"], default=None)
-    gap: Gap | None = entry("instead of structure.gap", default=None)
-    surfaces: MeasuredSurfaces | None = entry("instead of structure.surfaces", default=None)
-    frame: FaceFrame | None = entry("where the face lies; instead of the file's", default=None)
-    nodes: NodeTables | None = entry("where the worn surfaces go to; needs a frame", default=None)
+    name: Title = entry("name in the file; 'interface' if it has no names", "interface")
+    size: Sizes | None = entry(
+        "size, instead of structure.size [mm]", ["11 mm", "60 mm"], default=None
+    )
+    gap: Gap | None = entry("gap, instead of structure.gap", default=None)
+    surfaces: MeasuredSurfaces | None = entry(
+        "measured surfaces, instead of structure.surfaces", default=None
+    )
+    frame: FaceFrame | None = entry("place of the face, instead of that in the file", default=None)
+    nodes: NodeTables | None = entry(
+        "nodes that the worn surfaces go to; needs a frame", default=None
+    )
 
 
 class Resultants(Section):
     """Loads from a file, over nominal faces with the gap of the unloaded bodies."""
 
-    kind: Literal["resultants"] = entry("what the structure is", "resultants")
+    kind: Literal["resultants"] = entry("kind of structure", "resultants")
     dimension: Literal[2, 3] = entry(
         "3, or 2: line contacts in plane strain, loads per length", 3, default=3
     )
     file: Annotated[str, File((".csv", ".h5", ".hdf5"))] = entry(
-        "loads of one closed cycle (columns: docs, loads of another code); .h5 may go on :group",
+        "file with the loads of one closed cycle (columns: docs, loads of another code); .h5 "
+        "may name a :group",
         "loads.csv",
     )
     size: Sizes = entry(
-        "of every face and the contact grid, along x and y; in 2 dimensions along x alone [mm]",
+        "size of every face and the contact grid, along x and y; in 2 dimensions along x "
+        "alone [mm]",
         ["11 mm", "60 mm"],
     )
     gap: Gap | None = entry(
-        "distance of the unloaded bodies over every face; without it 'height' of an HDF5 file",
+        "gap of the unloaded bodies over every face; without it 'height' of an HDF5 file",
         default=None,
     )
     surfaces: MeasuredSurfaces | None = entry(
-        "as measured, on top of the gap, or all of it where there is none; of every face",
+        "measured surfaces of every face, added to the gap, or in place of it",
         default=None,
     )
     interfaces: tuple[ImportedInterface, ...] = entry(
-        "those to take and what is different on them; without it all of the file", default=()
+        "interfaces to use, and what differs on them; without it all of the file", default=()
     )
 
     @model_validator(mode="after")
@@ -190,7 +198,7 @@ class ImportedContact(ContactSection):
     """Half-space solution on a grid over each contact face."""
 
     method: Literal["normal", "full"] = entry(
-        "full: pressure and slips of the half-space; normal: slips of the file, an HDF5 one",
+        "full: pressure and slips of the half-space; normal: slips of the file, which must be HDF5",
         "full",
         default="full",
     )
@@ -329,7 +337,7 @@ class ResultantsCase(WearCase):
         elif loads.height is None and structure.surfaces_of(name) is None:
             raise disagreement(
                 f"missing, and {structure.file} has no height of {name}; allowed: shape rounded, "
-                "paraboloid or heights, with the entries of each, or surfaces as measured",
+                "paraboloid or heights, with the entries of each, or measured surfaces",
                 key,
             )
         elif loads.height is not None:
@@ -344,7 +352,7 @@ class ResultantsCase(WearCase):
             key = structure.key_of(name, f"nodes.body_{body}")
             if frame is None:
                 raise disagreement(
-                    f"nodes of {name} without its frame; allowed: frame beside nodes", key
+                    f"nodes of {name} without its frame; allowed: frame and nodes", key
                 )
             try:
                 check_nodes(file, frame, structure.size_of(name), structure.line)

@@ -93,7 +93,7 @@ def _mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, An
     if not present:
         return {}
     if len(present) == 1:
-        raise refusal(0, present[0], "given alone", f"{' and '.join(MIX)}, or neither")
+        raise refusal(0, present[0], "given without the other", f"{' and '.join(MIX)}, or neither")
     names, share = (columns[name] for name in MIX)
     begins = np.flatnonzero(np.diff(names, prepend=np.nan) != 0.0)
     for number, row in enumerate(begins.tolist()):
@@ -120,7 +120,7 @@ def _check_apart(columns: dict[str, Array], remainder: dict[str, float], refusal
     for name in COLUMNS[1:]:
         allowed = "0 where the bodies are apart"
         if name in ("Edx", "Edy"):
-            allowed += "; let an increment end just before they part"
+            allowed += "; let an increment end just before they separate"
         wrong = apart & (np.abs(columns[name]) > remainder[name])
         _refuse_where(wrong, name, "not zero though P is", allowed, refusal)
 

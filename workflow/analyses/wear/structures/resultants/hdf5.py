@@ -161,7 +161,7 @@ def _loads(group: FileGroup, bounds: Bounds) -> LoadHistory:
     missing = [name for name in required if name not in group.group]
     if missing:
         present = ", ".join(group.group) or "nothing"
-        allowed = f"all of them (Mx and My, or neither: held tilt); there is {present}"
+        allowed = f"all of them (Mx and My, or neither: held tilt); found: {present}"
         raise group.error("", f"{', '.join(missing)} missing", allowed)
     for name in own(group.group):
         known = (*units_of, "sliding", *MIX)
@@ -225,7 +225,7 @@ def _frame(group: FileGroup) -> Frame | None:
     if not attributes:
         return None
     if len(attributes) == 1:
-        raise group.error("", f"attribute {attributes[0]} alone", "origin (3,) and axes (3, 3)")
+        raise group.error("", f"only the attribute {attributes[0]}", "origin (3,) and axes (3, 3)")
     try:
         return frame_of(group.group)
     except InputError as error:

@@ -42,8 +42,8 @@ NOTE = "forces and moments of body 1 on body 2, in the frame of each interface"
 def marched(cycle: CycleSolution) -> str:
     """Return a note on which cycle the loads are, and how well it is closed."""
     return (
-        f"the last of {cycle.cycles} cycles marched from rest, which changes the contact forces "
-        f"of the one before it by {cycle.closure:.1e} of the largest"
+        f"the last of {cycle.cycles} cycles marched from rest; the contact forces differ from the "
+        f"cycle before by {cycle.closure:.1e} of the largest"
     )
 
 
