@@ -24,6 +24,7 @@ from tests.workflow.command_line import invoke, runs_here
 from tests.workflow.mesh_scenes import pressed_blocks
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear import run as wear_run
+from workflow.analyses.wear.budget.probe_cases import Probed
 from workflow.analyses.wear.output.layout import WearContents
 from workflow.kinds import kinds
 from workflow.pictures import drawing
@@ -414,7 +415,7 @@ def _without_probe_runs() -> Iterator[None]:
     test_error_budget.py tests them.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(wear_run, "begin_probe_runs", lambda *_: lambda *_: {})
+        patch.setattr(wear_run, "begin_probe_runs", lambda *_: lambda _: Probed())
         yield
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -67,14 +68,17 @@ def costs(
         stage_seconds(read_bytes(OutputFolder(folder).log).decode("utf-8", "replace"))
         for folder in folders
     ]
+    cacheable = [_cacheable_stages(*run) for run in zip(cases, stages, strict=True)]
     cold: dict[tuple[str, str], float] = {}
-    for case, logged in zip(cases, stages, strict=True):
-        for stage, (key, seconds) in _cacheable_stages(case, logged).items():
-            cold[stage, key] = max(cold.get((stage, key), 0.0), seconds)
-    return [
-        Cost(_seconds(case, logged, cold), *_work(summary))
-        for case, logged, summary in zip(cases, stages, summaries, strict=True)
-    ]
+    for stage, (key, warm) in chain.from_iterable(of_run.items() for of_run in cacheable):
+        cold[stage, key] = max(cold.get((stage, key), 0.0), warm)
+    paid = []
+    for logged, of_run, summary in zip(stages, cacheable, summaries, strict=True):
+        seconds = {name: sum(durations) for name, durations in logged.items() if name != PICTURES}
+        for stage, (key, warm) in of_run.items():
+            seconds[stage] += cold[stage, key] - warm
+        paid.append(Cost(sum(seconds.values()), *_work(summary)))
+    return paid
 
 
 def _cacheable_stages(
@@ -87,15 +91,6 @@ def _cacheable_stages(
         # The first solve is of the unworn cycle; later ones are of worn faces and never cached.
         cacheable[FRICTION] = case.model_dump_json(exclude=NOT_STRUCTURAL), stages[FRICTION][0]
     return cacheable
-
-
-def _seconds(
-    case: Case, stages: Mapping[str, Sequence[float]], cold: Mapping[tuple[str, str], float]
-) -> float:
-    seconds = {name: sum(durations) for name, durations in stages.items() if name != PICTURES}
-    for stage, (key, warm) in _cacheable_stages(case, stages).items():
-        seconds[stage] += cold[stage, key] - warm
-    return sum(seconds.values())
 
 
 def _work(summary: Mapping[str, Any]) -> tuple[int, int]:

@@ -93,7 +93,7 @@ def _compute(
     )
     with reported_stage(reporter, source, "condensation", "steps"):
         source.prepare()
-    probe_results = begin_probe_runs(case, source, reporter, run.beside)
+    probe_results = begin_probe_runs(case, source, run.beside)
     with one_thread():
         with reported_stage(reporter, source, "structural friction", "increments"):
             unworn = source.unworn()

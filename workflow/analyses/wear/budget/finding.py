@@ -10,7 +10,6 @@ import numpy as np
 
 from sa_solver.transforms.threads import at_once
 from sa_solver.types import Array, Progress, unseen
-from workflow.analyses.wear.approximations.probe_runs import Numbers
 from workflow.analyses.wear.approximations.registry import PARTS
 from workflow.analyses.wear.budget.parts import ContactErrors, ErrorByResult, ResultError
 from workflow.analyses.wear.budget.probe_cases import ProbeCases, Probed, late, scaled
@@ -27,8 +26,7 @@ from workflow.shell.terminal.reporter import Reporter
 # Smith, Watson and Topper stress times strain, that of Findley a stress.
 POWERS = {"ruiz": (1, 1), "smith_watson_topper": (0, 2), "findley": (0, 1)}
 
-ProbeErrors = dict[str, Numbers]  # by part
-ProbeResults = Callable[[Array, Progress], ProbeErrors]
+ProbeResults = Callable[[Progress], Probed]
 
 
 def error_budget(
@@ -36,13 +34,21 @@ def error_budget(
 ) -> dict[str, dict[str, ResultError]]:
     """Return the errors of the main results by interface, each by its sources."""
     with reporter.stage("error budget", "probe runs") as progress:
-        probed = probe_results(followed(outcome), progress)
+        probed = probe_results(progress)
+        for part, failure in probed.failures.items():
+            reporter.log(f"error budget: {part} unknown, a probe run failed: {failure}")
+        by_part = dict(probed.errors)
+        if "coupling" in by_part:
+            lag = late(probed.rate, followed(outcome))
+            by_part["coupling"] = {
+                name: scaled(numbers, lag) for name, numbers in by_part["coupling"].items()
+            }
         contacts = {
             contact.stage.name: ContactErrors(
                 outcome.case,
                 contact,
                 outcome.source.peak,
-                {part: by_name[contact.stage.name] for part, by_name in probed.items()},
+                {part: by_name[contact.stage.name] for part, by_name in by_part.items()},
             )
             for contact in outcome.interfaces
         }
@@ -88,33 +94,20 @@ def _sum(n: int, first: float | None, m: int, second: float | None) -> float | N
     return n * abs(first or 0.0) + m * abs(second or 0.0)
 
 
-def begin_probe_runs(
-    case: WearCase, source: LoadSource, reporter: Reporter, worker: WorkerProcess
-) -> ProbeResults:
-    """Return a function for the errors from probe runs, given when the loads followed wear.
+def begin_probe_runs(case: WearCase, source: LoadSource, worker: WorkerProcess) -> ProbeResults:
+    """Return a function for the errors from probe runs; none if the case requests no probe runs.
 
-    Errors are left out if the case requests no probe runs, and for parts whose probe run fails.
     Probe runs start at once in a worker process, unless this needs a copy of a large structure:
-    then they start when the function is called (see :func:`followed`).
+    then they start when the function is called.
     """
     if case.error_budget == "known" or case.contact.method == "nodes":
-        return lambda *_: {}
+        return lambda _: Probed()
     cases: ProbeCases[Any] = ProbeCases.of(case, structure_of(case), source.line)
-
-    def reported(probed: Probed, shares: Array) -> ProbeErrors:
-        for part, failure in probed.failures.items():
-            reporter.log(f"error budget: {part} unknown, because a probe run failed: {failure}")
-        if "coupling" not in probed.errors:
-            return probed.errors
-        lag, never = late(probed.rate, shares), probed.errors["coupling"]
-        follow = {name: scaled(numbers, lag) for name, numbers in never.items()}
-        return {**probed.errors, "coupling": follow}
-
     arguments = case, cases, source if cases.same else None
     if cases.same and not (source.line and isinstance(source, StructureLoads)):
-        return lambda shares, progress: reported(_probed(*arguments, progress), shares)
+        return partial(_probed, *arguments)
     answer = worker.begin(_probed, *arguments)
-    return lambda shares, _: reported(answer(), shares)
+    return lambda _: answer()
 
 
 def _probed(

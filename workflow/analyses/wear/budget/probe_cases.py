@@ -83,7 +83,7 @@ class ProbeCases(Generic[AnyWearCase]):
             refined, coarser = other[0] / grid[0], (grid[0] / across) ** GRID_ORDER
             share = share_of_difference(refined, GRID_ORDER) * coarser
             neighbours["grid"] = Neighbour({"contact.grid": other}, share)
-        if own.contact.link != "corrected":
+        if own.contact.link != "corrected" and not case.half_spaces:
             neighbours["link"] = Neighbour({"contact.link": "corrected"})
         finer_cells = {
             name: (across / case.terms(name).grid[0]) ** GRID_ORDER for name in case.contact_names
