@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,31 +21,6 @@ if TYPE_CHECKING:
 # Attributes that distinguish numbered groups: the first that all groups have, else their number.
 TOLD_APART_BY = ("cycles", "increment", "force", "level", "energy", "frequency")
 NUMBER = "number"
-
-
-@dataclass(frozen=True)
-class ResultsFile:
-    """File ``results.h5`` in its state when opened, since another run may replace it later."""
-
-    path: Path
-    written: tuple[int, ...]
-
-    @classmethod
-    def at(cls, path: Path) -> ResultsFile:
-        return cls(path, _written(path))
-
-    @contextmanager
-    def reading(self) -> Iterator[h5py.File]:
-        """Open the file for reading; raise :class:`UserError` if it has changed."""
-        if not self.path.exists() or _written(self.path) != self.written:
-            raise UserError(f"{self.path}: replaced or removed since it was opened; open it again")
-        with h5py.File(self.path) as file:
-            yield file
-
-
-def _written(path: Path) -> tuple[int, ...]:
-    status = path.stat()
-    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 class Group(Mapping[str, "Group | xr.DataArray"]):
@@ -76,24 +50,28 @@ class Group(Mapping[str, "Group | xr.DataArray"]):
     ('x', 'y') MPa 400.000 N
     """
 
-    def __init__(self, file: ResultsFile, name: str = "") -> None:
-        self._file, self.name = file, name
+    def __init__(self, path: Path, name: str = "", written: tuple[int, ...] = ()) -> None:
+        self._path, self.name = path, name
+        # Another run may replace the file later.
+        self._written = written or _written(path)
 
     @contextmanager
     def _reading(self) -> Iterator[h5py.Group]:
-        with self._file.reading() as file:
+        """Open the file for reading; raise :class:`UserError` if it has changed."""
+        if not self._path.exists() or _written(self._path) != self._written:
+            raise UserError(f"{self._path}: replaced or removed since it was opened; open it again")
+        with h5py.File(self._path) as file:
             yield file[self.name or "/"]
 
     def __getitem__(self, name: str) -> Any:
-        path = f"{self.name}/{name}".strip("/")
-        with self._file.reading() as file:
-            if path not in file:
+        with self._reading() as group:
+            if name not in group:
                 known = ", ".join(self)
                 raise KeyError(f"{name}: not there; {self.name or 'the results'}: {known}")
-            if isinstance(file[path], h5py.Group):
-                return Group(self._file, path)
-            above, _, last = path.rpartition("/")
-            return _data_set(file[above or "/"], last)[last]
+            if isinstance(group[name], h5py.Group):
+                return Group(self._path, f"{self.name}/{name}".strip("/"), self._written)
+            above, _, last = name.rpartition("/")
+            return _data_set(group[above] if above else group, last)[last]
 
     def __iter__(self) -> Iterator[str]:
         with self._reading() as group:
@@ -110,23 +88,8 @@ class Group(Mapping[str, "Group | xr.DataArray"]):
 
     def tree(self, depth: int = 20) -> str:
         """Return the contents as lines with shapes and units, down to ``depth`` levels."""
-        return "\n".join(self._lines(depth))
-
-    def _lines(self, depth: int, indent: str = "") -> Iterator[str]:
-        """Yield the lines of the tree, with only the first of numbered groups."""
-        numbered = [name for name in self if name.isdecimal()]
         with self._reading() as group:
-            for name in self:
-                if name in numbered[1:]:
-                    continue
-                more = f" to {numbered[-1]}" if name in numbered[:1] and len(numbered) > 1 else ""
-                if isinstance(group[name], h5py.Dataset):
-                    yield indent + _line(group[name])
-                    continue
-                yield f"{indent}{name}{more}/"
-                if depth > 1:
-                    below = Group(self._file, f"{self.name}/{name}".strip("/"))
-                    yield from below._lines(depth - 1, indent + "  ")
+            return "\n".join(_lines(group, depth))
 
     def xarray(self) -> xr.Dataset:
         """Return the datasets as an ``xarray.Dataset``; those of numbered groups are concatenated.
@@ -155,11 +118,10 @@ class Group(Mapping[str, "Group | xr.DataArray"]):
             coords="minimal",
             compat="override",
             join="outer",
-            combine_attrs="drop",
+            combine_attrs="override",
         )
-        for name in alike:
-            stacked[name].attrs = first[name].attrs
-        return stacked.assign(found.data_vars).assign_attrs(found.attrs)
+        stacked.attrs = found.attrs
+        return stacked.assign(found.data_vars)
 
     def pandas(self) -> pd.DataFrame:
         """Return the curves as a ``pandas.DataFrame``, or the numbers of numbered groups.
@@ -193,10 +155,16 @@ class Group(Mapping[str, "Group | xr.DataArray"]):
         return table.drop(columns=axis, errors="ignore")
 
     def __repr__(self) -> str:
-        return f"{self.name}/\n" + "\n".join(self._lines(2, "  "))
+        with self._reading() as group:
+            return "\n".join([f"{self.name}/", *_lines(group, 2, "  ")])
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>"
+
+
+def _written(path: Path) -> tuple[int, ...]:
+    status = path.stat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 # --- reading -------------------------------------------------------------------------------------
@@ -221,7 +189,8 @@ def _dims(name: str, dataset: h5py.Dataset) -> list[str]:
     if dataset.is_scale:
         return [name]
     return [
-        axis[0].name.rpartition("/")[2] if len(axis) else f"{name}_{number}"
+        # An older version of fretscale wrote labels in place of scales.
+        axis[0].name.rpartition("/")[2] if len(axis) else axis.label or f"{name}_{number}"
         for number, axis in enumerate(dataset.dims)
     ]
 
@@ -240,6 +209,21 @@ def _attributes(group: h5py.Group) -> dict[str, Any]:
         name: value.item() if isinstance(value, np.generic) else value
         for name, value in group.attrs.items()
     }
+
+
+def _lines(group: h5py.Group, depth: int, indent: str = "") -> Iterator[str]:
+    """Yield the lines of a tree, with only the first of numbered groups."""
+    numbered = list(_numbered(group))
+    for name in own(group):
+        if name in numbered[1:] or name == DIMENSIONS:
+            continue
+        more = f" to {numbered[-1]}" if name in numbered[:1] and len(numbered) > 1 else ""
+        if isinstance(group[name], h5py.Dataset):
+            yield indent + _line(group[name])
+            continue
+        yield f"{indent}{name}{more}/"
+        if depth > 1:
+            yield from _lines(group[name], depth - 1, indent + "  ")
 
 
 def _line(dataset: h5py.Dataset) -> str:

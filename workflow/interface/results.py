@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from workflow.case.sections import Case
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent, readable
-from workflow.interface.datasets import Group, ResultsFile
+from workflow.interface.datasets import Group
 from workflow.kinds import analysis_of, load_case
 from workflow.report.writing import write_report
 from workflow.runs.provenance import case_values
@@ -120,7 +120,7 @@ class Results(Group):
     """
 
     def __init__(self, folder: Path, summary: dict[str, Any]) -> None:
-        super().__init__(ResultsFile.at(OutputFolder(folder).results))
+        super().__init__(OutputFolder(folder).results)
         self.folder = folder
         self.summary = {name: value for name, value in summary.items() if name != DIGESTS}
 

@@ -51,19 +51,34 @@ Arrays = Mapping[str, NDArray[Any]]
 """Arrays of one group, by name."""
 
 
-def over(dims: str, **datasets: tuple[str, str]) -> dict[str, Declared]:
-    """Return datasets over the same dimensions ("x y", say), from unit and description of each."""
-    axes = tuple(dims.split())
-    return {name: Declared(*described, axes) for name, described in datasets.items()}
+def declared(text: str) -> dict[str, Declared]:
+    """Return the datasets of a text, with a line for each.
+
+    A line has name, unit, dimensions and description, and perhaps the unit in a line contact,
+    separated by bars. A line without bars continues the description above it. Several names may
+    share a line, separated by commas; # stands for the part of each behind its last underscore.
+    """
+    rows: list[list[str]] = []
+    for line in filter(str.strip, text.splitlines()):
+        cells = [cell.strip() for cell in line.split("|")]
+        if len(cells) == 1:
+            rows[-1][3] += f" {cells[0]}"
+        else:
+            rows.append(cells)
+    return {
+        name: Declared(
+            unit, text.replace("#", name.split("_")[-1]), tuple(dims.split()), *line_unit
+        )
+        for names, unit, dims, text, *line_unit in rows
+        for name in names.split(", ")
+    }
 
 
-GRID = {
-    **over("x", x=("mm", "centres of the cells along x")),
-    **over("y", y=("mm", "centres of the cells along y")),
-}
+GRID = """
+    x | mm | x | centres of the cells along x
+    y | mm | y | centres of the cells along y
+"""
 """Coordinates of the cells of a grid."""
-CELLS = "x y"
-"""Dimensions of a field on the cells of a grid."""
 
 
 @dataclass(frozen=True)
@@ -78,17 +93,39 @@ class Layout:
     groups: Mapping[str, Declarations]
     coordinates: Mapping[str, str] = field(default_factory=dict)
 
+    @classmethod
+    def read(cls, text: str, **coordinates: str) -> Layout:
+        """Return the layout of a text: groups, and below them, indented, their datasets.
+
+        The datasets are as in :func:`declared`. Groups of the same datasets share a line, separated
+        by commas.
+        """
+        groups: dict[str, str] = {}
+        names: list[str] = []
+        for line in filter(str.strip, text.splitlines()):
+            if line.startswith(" "):
+                groups |= {name: f"{groups[name]}{line}\n" for name in names}
+            else:
+                names = line.split(", ")
+                groups |= dict.fromkeys(names, "")
+        return cls({name: declared(lines) for name, lines in groups.items()}, coordinates)
+
     def datasets(self, group: str) -> Declarations:
         """Return the datasets that a group may have. Raises KeyError for an undeclared group."""
         return self.groups[self._pattern(group)]
 
-    def unit(self, path: str, line: bool) -> str:
-        """Return the unit of a dataset, or of the coordinate x of a group."""
-        group, _, name = path.rpartition("/")
-        for pattern, datasets in self.groups.items():
-            if name in datasets and _matches(pattern, group):
-                return datasets[name].unit_in(line)
-        return self.datasets(path)["x"].unit_in(line)
+    def units(self, y: str, x: str, line: bool) -> tuple[str, str]:
+        """Return the units of a curve: of its abscissa, and of the dataset at the path ``y``.
+
+        ``x`` is a dataset of the same group, or empty for the coordinate of the first axis, of a
+        field the coordinate x.
+        """
+        group, _, name = y.rpartition("/")
+        own = next(d for p, d in self.groups.items() if name in d and _matches(p, group))
+        dim = x or ("x" if "x" in own[name].dims else own[name].dims[0])
+        places = (own, *(d for d in self.groups.values() if dim in d and d[dim].dims == (dim,)))
+        along = next(datasets[dim] for datasets in places if dim in datasets)
+        return along.unit_in(line), own[name].unit_in(line)
 
     def coordinates_of(self, group: str, dim: str) -> list[str]:
         """Return the path of a coordinate that is neither in a group nor above it, if any."""

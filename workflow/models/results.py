@@ -15,46 +15,37 @@ from wear.contact.tractions import ContactFields
 from wear.coupled import CoupledState, Observer
 from wear.steps.step_errors import step_errors
 from wear.surfaces import Surfaces
-from workflow.layout.declared import CELLS, GRID, Declared, over
+from workflow.layout.declared import GRID, Declared, declared
 from workflow.models.contacts import FaceContacts
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-COORDINATES = {**over("cycles", cycles=("1", "load cycles so far")), **GRID}
-FIELDS = {
-    **over(CELLS, gap=("mm", "between the unloaded, unworn bodies")),
-    **over(
-        f"cycles {CELLS}",
-        depth_1=("mm", "worn off body 1"),
-        depth_2=("mm", "worn off body 2"),
-        pressure=("MPa", "at peak load"),
-    ),
-    **over(
-        f"cycles component {CELLS}",
-        shear=("MPa", "on body 2 at peak load"),
-        slip=("mm", "of body 2 in the increment of peak load"),
-    ),
-}
-SCALARS = over(
-    "cycles",
-    largest_depth_1=("mm", "largest depth worn off body 1"),
-    largest_depth_2=("mm", "largest depth worn off body 2"),
-    volume_1=("mm^3", "worn off body 1"),
-    volume_2=("mm^3", "worn off body 2"),
-    energy=("N mm", "dissipated so far"),
-)
-RESULTANTS = over(
-    "state increment",
-    P=("N", "normal force, positive where the bodies are pressed together"),
-    Qx=("N", "force on body 2 along x"),
-    Qy=("N", "force on body 2 along y"),
-    Mx=("N mm", "moment on body 2 about x"),
-    My=("N mm", "moment on body 2 about y"),
-    Mz=("N mm", "moment on body 2 about z"),
-)
-RUN = over("cycles", drift=("1", "change of the resultants after each jump, relative"))
+COORDINATES = declared(f"""{GRID}
+    cycles | 1 | cycles | load cycles so far
+""")
+FIELDS = declared("""
+    gap | mm | x y | between the unloaded, unworn bodies
+    depth_1, depth_2 | mm | cycles x y | worn off body #
+    pressure | MPa | cycles x y | at peak load
+    shear | MPa | cycles component x y | on body 2 at peak load
+    slip | mm | cycles component x y | of body 2 in the increment of peak load
+""")
+SCALARS = declared("""
+    largest_depth_1, largest_depth_2 | mm | cycles | largest depth worn off body #
+    volume_1, volume_2 | mm^3 | cycles | worn off body #
+    energy | N mm | cycles | dissipated so far
+""")
+RESULTANTS = declared("""
+    P | N | state increment | normal force, positive where the bodies are pressed together
+    Qx | N | state increment | force on body 2 along x
+    Qy | N | state increment | force on body 2 along y
+    Mx | N mm | state increment | moment on body 2 about x
+    My | N mm | state increment | moment on body 2 about y
+    Mz | N mm | state increment | moment on body 2 about z
+""")
+RUN = declared("drift | 1 | cycles | change of the resultants after each jump, relative")
 
 
 @dataclass
@@ -158,8 +149,8 @@ class WearResults:
     def _cycles(self) -> xr.Variable:
         return self._variable(COORDINATES["cycles"], np.array(self.recorder.cycles))
 
-    def _variable(self, declared: Declared, values: Array) -> xr.Variable:
-        return declared.variable(values, self.line)
+    def _variable(self, variable: Declared, values: Array) -> xr.Variable:
+        return variable.variable(values, self.line)
 
 
 def _both(loads: Sequence[LoadHistory], name: str) -> Array:

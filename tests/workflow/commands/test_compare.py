@@ -7,14 +7,17 @@ import h5py
 import numpy as np
 import pytest
 
+from sa_solver.types import Grid
 from tests.workflow.conftest import invoke
 from tests.workflow.output.test_report import QUIET, Page
 from tests.workflow.scenes import BALL
 from workflow.comparing import compare
 from workflow.errors import UserError
+from workflow.layout.declared import Layout
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.curves import curves_in
 from workflow.shell.output.quantities import CurvesOf
+from workflow.shell.output.results import writing
 
 JOINT = """\
 title: Spring and slider
@@ -157,26 +160,36 @@ def test_runs_of_one_name_are_told_apart_by_where_they_are(runs, tmp_path):
 
 def test_curves_are_found_by_patterns(tmp_path):
     """Patterns find any group, the last numbered one, the last column, the middle of a field."""
-    with h5py.File(tmp_path / "results.h5", "w") as file:
+    layout = Layout.read(
+        """
+responses/<response>/loops/<loop>
+    force | N | point kind | pulled
+    displacement | mm | point kind | moved
+grid/<face>
+    x | mm | x | along
+    y | mm | y | across
+contact/<face>/<jump>
+    pressure | MPa | x y | pressed
+""",
+        x="grid/<face>",
+        y="grid/<face>",
+    )
+    with writing(tmp_path / "results.h5", layout) as writer:
         for force, name in ((10.0, "00000"), (30.0, "00001")):
-            group = file.create_group(f"responses/{name}")
-            group.attrs["force"] = force
+            writer.put(f"responses/{name}", {}, force=force)
             for number in (2, 10):
                 values = np.column_stack([np.zeros(3), np.full(3, number)])
-                for dataset, unit in (("force", "N"), ("displacement", "mm")):
-                    made = group.create_dataset(f"loops/{number:05d}/{dataset}", data=values)
-                    made.attrs["unit"] = unit
-            group["loops/00010/displacement"].attrs["unit"] = "mm"
-        grid = file.create_group("grid/face")
-        grid.attrs["shape"], grid.attrs["pitch"] = (4, 3), (1.0, 2.0)
-        field = file.create_dataset("contact/face/00007/pressure", data=np.arange(12).reshape(4, 3))
-        field.attrs["unit"] = "MPa"
+                loop = {"force": values, "displacement": values}
+                writer.put(f"responses/{name}/loops/{number:05d}", loop)
+        writer.put_grid("grid/face", Grid((4, 3), (1.0, 2.0)))
+        writer.put("contact/face/00007", {"pressure": np.arange(12).reshape(4, 3)})
+    with h5py.File(tmp_path / "results.h5") as file:
         at = "responses/*/loops/-1"
-        loops = CurvesOf("loop", f"{at}/force", f"{at}/displacement")
+        loops = CurvesOf("loop", f"{at}/displacement", "force")
         found = list(curves_in(file, loops))
         assert [curve.title for curve in found] == ["loop, under 10 N", "loop, under 30 N"]
         assert found[0].y.tolist() == [10.0, 10.0, 10.0]
-        (profile,) = curves_in(file, CurvesOf("p", "grid/*", "contact/*/-1/pressure"))
+        (profile,) = curves_in(file, CurvesOf("p", "contact/*/-1/pressure"))
         assert (profile.title, profile.y.tolist()) == ("p, face", [1, 4, 7, 10])
         assert profile.x.tolist() == [-1.5, -0.5, 0.5, 1.5]
-        assert list(curves_in(file, CurvesOf("none", "grid/*", "loops/*/-1/force"))) == []
+        assert list(curves_in(file, CurvesOf("none", "loops/*/-1/force"))) == []

@@ -112,10 +112,7 @@ def check_units_of_curves(run):
     with h5py.File(folder.results) as file:
         for wanted in analysis.curves:
             for curve in curves_in(file, wanted):
-                units = [
-                    (layout.unit(wanted.x, line), layout.unit(wanted.y, line))
-                    for line in (False, True)
-                ]
+                units = [layout.units(wanted.y, wanted.x, line) for line in (False, True)]
                 assert (curve.x_unit, curve.y_unit) in units, curve.title
 
 

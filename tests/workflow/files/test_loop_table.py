@@ -17,7 +17,7 @@ from workflow.errors import UserError
 def rows(count):
     numbers = np.random.default_rng(4).random((count, len(COLUMNS)))
     numbers[:, 1].sort()
-    return [dict(zip([c.name for c in COLUMNS], row, strict=True)) for row in numbers]
+    return [dict(zip(COLUMNS, row, strict=True)) for row in numbers]
 
 
 @pytest.mark.parametrize("per_length", [False, True])
@@ -27,17 +27,17 @@ def test_table_reads_back_equal(tmp_path, per_length):
     write_loop_table(path, given, per_length)
     table, written = read_loop_table(path), read_table_file(path)
     assert table.per_length is per_length
-    for column in COLUMNS:
-        expected = [row[column.name] for row in given]
-        numbers = written.column(column.name, Quantity(column.units(per_length)[0]))
+    for name, column in COLUMNS.items():
+        expected = [row[name] for row in given]
+        numbers = written.column(name, Quantity(column.unit_in(per_length)))
         np.testing.assert_allclose(numbers, expected, rtol=1e-11)
-        if column.name in NEEDED:
-            np.testing.assert_array_equal(getattr(table, column.name), numbers)
+        if name in NEEDED:
+            np.testing.assert_array_equal(getattr(table, name), numbers)
 
 
 def test_table_names_everyday_units(tmp_path):
     path = tmp_path / "loops_face.csv"
-    write_loop_table(path, [dict.fromkeys((c.name for c in COLUMNS), 1000.0)])
+    write_loop_table(path, [dict.fromkeys(COLUMNS, 1000.0)])
     headings, first = path.read_text().splitlines()
     assert headings.startswith("cycles [1],energy [J],P [N],kt [N/mm],mu [1],energy_per_loop [mJ],")
     assert first.split(",")[:2] == ["1000", "1"]

@@ -14,7 +14,7 @@ from tests.conftest import CASES
 from workflow.case.sections import Case, Measured
 from workflow.errors import UserError
 from workflow.kinds import load_case
-from workflow.layout.declared import Declared, Layout
+from workflow.layout.declared import Layout
 from workflow.pictures.measured import MEASURED, with_measured
 from workflow.shell.analysis import Pictures
 from workflow.shell.output.curves import Curve
@@ -29,15 +29,17 @@ from workflow.shell.output.measured import (
     told,
 )
 from workflow.shell.output.quantities import CurvesOf
+from workflow.shell.output.results import writing
 
-DEPTH = CurvesOf("depth", "kinetics/cycles", "kinetics/*/depth")
-VOLUME = CurvesOf("volume", "kinetics/cycles", "kinetics/*/volume")
-LAYOUT = Layout(
-    {
-        "kinetics": {"cycles": Declared("1", "cycles", ("cycles",))},
-        "kinetics/<face>": {"depth": Declared("mm", "worn depth", ("cycles",))},
-    }
-)
+DEPTH = CurvesOf("depth", "kinetics/*/depth")
+VOLUME = CurvesOf("volume", "kinetics/*/volume")
+LAYOUT = Layout.read("""
+kinetics
+    cycles | 1 | cycles | cycles
+kinetics/<face>
+    depth | mm | cycles | worn depth
+    volume | mm^3 | cycles | worn volume
+""")
 INLINE = {"curve": "depth", "at": [100.0], "values": ["3 um"], "source": "made up"}
 
 
@@ -147,12 +149,10 @@ def results(tmp_path: Path) -> Path:
     """Return depth and volume of a contact, whose numbers differ by a factor of a thousand."""
     path = tmp_path / "results.h5"
     cycles = np.linspace(0.0, 1e4, 51)
-    with h5py.File(path, "w") as file:
-        file["kinetics/cycles"] = cycles
-        file["kinetics/pad/depth"] = 3e-5 * cycles / 100.0
-        file["kinetics/pad/volume"] = 3e-2 * cycles / 100.0
-        for name, unit in (("cycles", "1"), ("pad/depth", "mm"), ("pad/volume", "mm^3")):
-            file[f"kinetics/{name}"].attrs["unit"] = unit
+    with writing(path, LAYOUT) as writer:
+        writer.put("kinetics", {"cycles": cycles})
+        worn = {"depth": 3e-5 * cycles / 100.0, "volume": 3e-2 * cycles / 100.0}
+        writer.put("kinetics/pad", worn)
     return path
 
 

@@ -32,7 +32,6 @@ from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case
 from workflow.models.loops import TangentialLoops, worn_loop
 from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.folders.store import write_arrays
 from workflow.shell.output.results import writing
 
 BODY = Material(115e3, 0.0)
@@ -164,12 +163,11 @@ def test_force_beyond_friction_ends_the_run_in_one_line():
 def with_loops(root, loop, line=False):
     """Return results with loops of jumps 0 and 2, as after ``every: end``."""
     folder = OutputFolder(root)
-    folder.jumps.mkdir(parents=True)
-    for jump in range(3):
-        arrays = kept_loops(["sphere"], [loop]) if jump != 1 else {"other": np.zeros(1)}
-        write_arrays(folder.jump(jump), arrays, {"cycles": 100.0 * jump})
+    kept = [{"cycles": 100.0 * jump} for jump in range(3)]
+    for jump in (0, 2):
+        kept[jump] |= kept_loops(["sphere"], [loop])
     with writing(folder.results, LAYOUT, line) as writer:
-        write_loops(writer, folder, 2)
+        write_loops(writer, kept)
         writer.put_grid("grid/sphere", Grid((32, 32), (0.1, 0.1)))
     return folder
 
@@ -292,7 +290,7 @@ def test_run_writes_a_table_for_every_interface(rubbed):
     """Cycles, energy, load and area are those of the run; the loop slides, so µ is the case's."""
     summary = rubbed.summary
     for name in ("left", "right"):
-        quantities = {column.name: Quantity(column.unit) for column in COLUMNS}
+        quantities = {name: Quantity(column.unit) for name, column in COLUMNS.items()}
         file = rubbed.folder / f"loops_{name}.csv"
         table = SimpleNamespace(**read_columns(str(file), quantities))
         kinetics = summary["kinetics"][name]

@@ -25,19 +25,11 @@ STATE = {
 COUPLED = {"secant_stiffness": "secant_stiffness", "energy_per_cycle": "energy"}
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
-    CurvesOf(
-        "tangential stiffness",
-        "loads/*/kinetics/cycles",
-        "loads/*/kinetics/stick_stiffness",
-    ),
-    CurvesOf("contact area", "loads/*/kinetics/cycles", "loads/*/kinetics/area"),
-    CurvesOf("depth worn from body 1", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_1"),
-    CurvesOf("depth worn from body 2", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_2"),
-    CurvesOf(
-        "loop, worn",
-        "loads/*/states/-1/loop/ring_displacement",
-        "loads/*/states/-1/loop/ring_force",
-    ),
+    CurvesOf("tangential stiffness", "loads/*/kinetics/stick_stiffness"),
+    CurvesOf("contact area", "loads/*/kinetics/area"),
+    CurvesOf("depth worn from body 1", "loads/*/kinetics/depth_1"),
+    CurvesOf("depth worn from body 2", "loads/*/kinetics/depth_2"),
+    CurvesOf("loop, worn", "loads/*/states/-1/loop/ring_force", "ring_displacement"),
 )
 
 

@@ -7,69 +7,42 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from workflow.analyses.time.case import JointCase, RigCase
-from workflow.layout.declared import Arrays, Layout, over
+from workflow.layout.declared import Arrays, Layout, declared
+from workflow.models.rig.layout import CURVES
 
 # The parameters of a joint that evolve, in the order of reports.
-PARAMETERS = over(
-    "",
-    friction=("1", "coefficient of friction"),
-    stiffness=("N/mm", "slope of the stuck joint"),
-    residual_stiffness=("N/mm", "slope of the sliding joint"),
-    normal_load=("N", "normal load"),
-)
+_PARAMETERS = """
+    friction | 1 | energy | coefficient of friction
+    stiffness | N/mm | energy | slope of the stuck joint
+    residual_stiffness | N/mm | energy | slope of the sliding joint
+    normal_load | N | energy | normal load
+"""
+PARAMETERS = declared(_PARAMETERS)
 # Groups of curves of a state.
 LOOP, MOTION, RESPONSE, RING_DOWN = "loop", "motion", "frequency_response", "ring_down"
 EVOLUTION = "evolution"
-_EACH = "of the joints of each entry of structure.joints"
-LAYOUT = Layout(
-    {
-        EVOLUTION: {
-            **over(
-                "energy",
-                energy=("N mm", "energy dissipated so far in the joint"),
-                cycles=("1", "cycles so far"),
-                energy_per_cycle=("N mm", "energy dissipated in a cycle"),
-            ),
-            **{name: declared._replace(dims=("energy",)) for name, declared in PARAMETERS.items()},
-        },
-        f"states/<state>/{LOOP}": over(
-            "point",
-            displacement=("mm", "displacement of the joint, or the mean of several, in a cycle"),
-            force=("N", "force that resists it"),
-        ),
-        f"states/<state>/{MOTION}": {
-            **over("time", time=("s", "time"), excitation=("N", "force of the excitation")),
-            **over(
-                "time seen",
-                displacement=("mm", "displacements of the reported points"),
-                acceleration=("mm/s^2", "accelerations of the reported points"),
-            ),
-            **over(
-                "time", joint_force=("N", "force of the joint, or the sum of several, resisting")
-            ),
-            **over(
-                "time entry",
-                joints_displacement=("mm", f"mean displacement {_EACH}"),
-                joints_force=("N", f"sum of the forces {_EACH}, resisting"),
-            ),
-            **over(
-                "time",
-                dissipated=("N mm", "energy that the joint has dissipated since the beginning"),
-            ),
-        },
-        f"states/<state>/{RESPONSE}": over(
-            "frequency",
-            frequency=("Hz", "frequency"),
-            magnitude=("mm/(s^2 N)", "acceleration of the reported point over the excitation"),
-            phase=("rad", "phase of the acceleration to the excitation"),
-        ),
-        f"states/<state>/{RING_DOWN}": over(
-            "amplitude",
-            amplitude=("mm", "amplitude of the reported point, in its first mode"),
-            frequency=("Hz", "instantaneous frequency"),
-            damping_ratio=("1", "instantaneous damping ratio"),
-        ),
-    }
+LAYOUT = Layout.read(
+    f"""
+{EVOLUTION}
+    energy | N mm | energy | energy dissipated so far in the joint
+    cycles | 1 | energy | cycles so far
+    energy_per_cycle | N mm | energy | energy dissipated in a cycle
+    {_PARAMETERS}
+states/<state>/{LOOP}
+    displacement | mm | point | displacement of the joint, or the mean of several, in a cycle
+    force | N | point | force that resists it
+states/<state>/{MOTION}{CURVES}
+    joints_displacement | mm | time entry | mean displacement of each entry of structure.joints
+    joints_force | N | time entry | sum of the forces of each entry of structure.joints, resisting
+states/<state>/{RESPONSE}
+    frequency | Hz | frequency | frequency
+    magnitude | mm/(s^2 N) | frequency | acceleration of the reported point over the excitation
+    phase | rad | frequency | phase of the acceleration to the excitation
+states/<state>/{RING_DOWN}
+    amplitude | mm | amplitude | amplitude of the reported point, in its first mode
+    frequency | Hz | amplitude | instantaneous frequency
+    damping_ratio | 1 | amplitude | instantaneous damping ratio
+"""
 )
 
 

@@ -34,22 +34,17 @@ NUMBERS = {
 MOVED = "stroke", "largest_displacement"
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
-    CurvesOf("cycles", "evolution/energy", "evolution/cycles"),
-    CurvesOf("stiffness of the joint", "evolution/energy", "evolution/stiffness"),
-    CurvesOf("friction of the joint", "evolution/energy", "evolution/friction"),
-    CurvesOf("normal load of the joint", "evolution/energy", "evolution/normal_load"),
-    CurvesOf("loop in the last state", "states/-1/loop/displacement", "states/-1/loop/force"),
+    CurvesOf("cycles", "evolution/cycles"),
+    CurvesOf("stiffness of the joint", "evolution/stiffness"),
+    CurvesOf("friction of the joint", "evolution/friction"),
+    CurvesOf("normal load of the joint", "evolution/normal_load"),
+    CurvesOf("loop in the last state", "states/-1/loop/force", "displacement"),
     CurvesOf(
         "frequency response in the last state",
-        "states/-1/frequency_response/frequency",
         "states/-1/frequency_response/magnitude",
         logarithmic=True,
     ),
-    CurvesOf(
-        "damping in the ring-down, last state",
-        "states/-1/ring_down/amplitude",
-        "states/-1/ring_down/damping_ratio",
-    ),
+    CurvesOf("damping in the ring-down, last state", "states/-1/ring_down/damping_ratio"),
 )
 
 
@@ -90,6 +85,6 @@ def _of_state(number: int, when: str, summary: Summary) -> Iterator[SummaryQuant
         if name == "cycles":
             known = _of_ageing(summary)
         yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
-    for name, declared in PARAMETERS.items():
+    for name, parameter in PARAMETERS.items():
         everyday = "N/um" if name in STIFFNESSES else ""
-        yield of(declared.description, f"{place}.{name}", declared.unit, everyday=everyday)
+        yield of(parameter.description, f"{place}.{name}", parameter.unit, everyday=everyday)

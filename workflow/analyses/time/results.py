@@ -9,7 +9,6 @@ from workflow.analyses.time.case import JointCase, RigCase, TimeCase, joules
 from workflow.analyses.time.outcome import EVOLUTION, LAYOUT, MOTION, State, TimeOutcome
 from workflow.case.fields import in_unit_of
 from workflow.shell.analysis import Run
-from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish, number_at
 from workflow.shell.output.tables import write_curves
@@ -20,10 +19,9 @@ TimeRun = Run[JointCase | RigCase]
 
 def write_time_output(outcome: TimeOutcome, run: TimeRun) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
-    folder, reporter = run.folder, run.reporter
+    reporter = run.reporter
     with reporter.stage("results"):
         _write_results(outcome, run)
-        _write_tables(outcome, folder)
     run.draw(outcome.contents)
     summary = _summary(outcome, reporter)
     finish(run, summary, _lines(summary, outcome.case))
@@ -33,11 +31,15 @@ def write_time_output(outcome: TimeOutcome, run: TimeRun) -> None:
 
 
 def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
-    case = outcome.case
+    """Write results, and as CSV the evolution and the curves of every state but motions."""
+    case, folder = outcome.case, run.folder
     attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": outcome.seen or None}
     with run_results(run, case, LAYOUT, attributes) as writer:
         writer.put_contents(outcome.contents)
         writer.put(EVOLUTION, outcome.evolution)
+        what = "parameters of the joint over the energy it has dissipated"
+        path = folder.reserve(f"{EVOLUTION}.csv", what)
+        write_curves(path, outcome.evolution, LAYOUT.datasets(EVOLUTION))
         for number, state in enumerate(outcome.states):
             place = f"states/{number:05d}"
             scalars = {k: v for k, v in state.numbers.items() if isinstance(v, int | float | list)}
@@ -45,23 +47,11 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
             writer.put(place, {}, **(parameters | scalars))
             for group, curves in state.curves.items():
                 writer.put(f"{place}/{group}", curves)
-
-
-def _write_tables(outcome: TimeOutcome, folder: OutputFolder) -> None:
-    """Write the evolution and the curves of every state as CSV in base units.
-
-    Motions are left out, as they are too long.
-    """
-    what = "parameters of the joint over the energy it has dissipated"
-    write_curves(
-        folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution, LAYOUT.datasets(EVOLUTION)
-    )
-    for number, state in enumerate(outcome.states):
-        for group, curves in state.curves.items():
-            if group != MOTION:
+                if group == MOTION:
+                    continue
                 what = f"{group.replace('_', ' ')} at {joules(state.energy)}"
-                path, place = folder.reserve(f"{group}_{number:05d}.csv", what), f"states/-/{group}"
-                write_curves(path, curves, LAYOUT.datasets(place))
+                path = folder.reserve(f"{group}_{number:05d}.csv", what)
+                write_curves(path, curves, LAYOUT.datasets(f"{place}/{group}"))
 
 
 # --- summary ------------------------------------------------------------------------------------

@@ -17,8 +17,9 @@ from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.coupled import Observer
 from workflow.errors import MethodFailed, ModelWarning
-from workflow.layout.declared import over
+from workflow.layout.declared import declared
 from workflow.models.rig.laws import Laws
+from workflow.models.rig.layout import CURVES
 from workflow.models.rig.rig_model import RigModel
 
 if TYPE_CHECKING:
@@ -26,20 +27,6 @@ if TYPE_CHECKING:
 
 # Error by time steps, as a share of the largest displacement, from which a warning is given.
 LARGEST_ERROR = 0.05
-CURVES = {
-    **over(
-        "time",
-        time=("s", "time"),
-        excitation=("N", "force of the excitation"),
-        joint_force=("N", "force of the joint, or the sum of several, resisting"),
-        dissipated=("N mm", "energy that the joint has dissipated since the beginning"),
-    ),
-    **over(
-        "time place",
-        displacement=("mm", "displacements of the reported points"),
-        acceleration=("mm/s^2", "accelerations of the reported points"),
-    ),
-}
 
 
 @dataclass(frozen=True)
@@ -77,7 +64,7 @@ class MotionModel:
     >>> model = fretscale.MotionModel(rig, law, force, 0.1, TimeStepControl(1e-4))
     >>> motion = model.run()
     >>> print(motion["displacement"].dims, motion.attrs["step_error"] < 0.01)
-    ('time', 'place') True
+    ('time', 'seen') True
     """
 
     rig: RigModel
@@ -149,10 +136,10 @@ class MotionModel:
                 ModelWarning,
                 stacklevel=2,
             )
-        curves = curves_of(self.rig, self.force, motion)
+        curves, described = curves_of(self.rig, self.force, motion), declared(CURVES)
         return xr.Dataset(
-            {name: CURVES[name].variable(values) for name, values in curves.items()},
-            coords={"place": list(self.rig.labels)},
+            {name: described[name].variable(values) for name, values in curves.items()},
+            coords={"seen": list(self.rig.labels)},
             attrs={
                 "step_error": motion.error,
                 "balance_error": motion.energies.balance_error,

@@ -15,7 +15,6 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.resolution_error import resolution_error
 from sa_solver.types import Array
 from wear.joints.periodic.march import SEPARATED, SLIP
-from workflow.layout.declared import over
 from workflow.models.vibration.structure import VibratingStructure
 
 # Times of a period from which amplitudes are taken. The true amplitude of harmonic 1 is at most
@@ -24,39 +23,13 @@ TIMES = 1024
 # Tolerance on the frequency of the largest amplitude, relative to it.
 RESONANCE_TOLERANCE = 1e-6
 
-SEEN = "half the peak-to-peak motion of the reported points, the last being the main one"
-SLIPS = "share of the cycle in which a joint slips, mean of those that touch at rest"
-COLUMNS = {
-    **over(
-        "point place",
-        amplitude=("mm", f"{SEEN}; relative to the ground if it moves"),
-        absolute_amplitude=("mm", f"{SEEN}, including that of the ground"),
-    ),
-    **over(
-        "point",
-        phase=(
-            "rad",
-            "phase by which harmonic 1 of the reported point leads the force, or a sine at t = 0",
-        ),
-        energy_per_cycle=("N mm", "energy that the joints dissipate in a cycle"),
-        damping=("1", "energy lost in a cycle over 4π times the largest kinetic energy"),
-        slip=("1", SLIPS),
-        separated=("1", "share of the cycle in which they are open"),
-        left_out=(
-            "1",
-            "estimated share of the joints' vibration in harmonics that are not included",
-        ),
-    ),
-}
-"""Columns of the motions along a curve; absolute amplitudes only where the ground moves."""
-
 
 def motion_columns(
     structure: VibratingStructure, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
 ) -> dict[str, Array]:
     """Return the values of motions along a curve: ``(n,)`` each, amplitudes ``(n, k)``.
 
-    :data:`COLUMNS` describes them.
+    They are declared in :mod:`workflow.models.vibration.layout`.
     """
 
     def column(of: Callable[[HarmonicSolution], Array | float]) -> Array:

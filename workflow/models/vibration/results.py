@@ -12,9 +12,9 @@ from fe_models.dynamics.curves.forced_response import ResponseBranch
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
-from workflow.layout.declared import Declared, over
-from workflow.models.vibration.amount import FORCE, ExcitationSize
-from workflow.models.vibration.motions import COLUMNS, amplitudes_of
+from workflow.layout.declared import declared
+from workflow.models.vibration.layout import AMPLITUDES, MOTIONS, linear_limits
+from workflow.models.vibration.motions import amplitudes_of
 from workflow.models.vibration.structure import VibratingStructure
 
 if TYPE_CHECKING:
@@ -22,20 +22,10 @@ if TYPE_CHECKING:
 
 # Error of a motion, due to harmonics and samples, that gives a warning.
 LARGEST_ERROR = 0.05
-FREQUENCY = Declared("Hz", "frequency of the force, in the order of the curve", ("point",))
-
-
-def linear_limits(amount: ExcitationSize) -> dict[str, Declared]:
-    """Return the declaration of the linear limits under an amount: a force or a level."""
-    unit, _ = amount.receptance
-    first = "" if amount is FORCE else ", of harmonic 1"
-    size = f"amplitude of the reported point over the {amount.name}{first}"
-    return over(
-        "frequency",
-        frequency=("Hz", "frequency of the force"),
-        free=(unit, f"{size}, without the joints"),
-        stuck=(unit, f"{size}, all joints stuck"),
-    )
+CURVE = declared(f"""
+    frequency | Hz | point | frequency of the force, in the order of the curve
+    {AMPLITUDES.format(dim="point")}{MOTIONS.format(dim="point")}
+""")
 
 
 @dataclass(frozen=True)
@@ -94,8 +84,8 @@ class VibrationResults:
         import xarray as xr
 
         limits, amount = self.structure.linear(self.frequencies), self.structure.driving.amount
-        declared = linear_limits(amount)
-        variables = {name: declared[name].variable(array) for name, array in limits.items()}
+        described = declared(linear_limits(amount))
+        variables = {name: described[name].variable(array) for name, array in limits.items()}
         return xr.Dataset(variables).set_coords("frequency")
 
     def _response(self, response: ForcedResponse) -> xr.Dataset:
@@ -104,10 +94,10 @@ class VibrationResults:
         branch, resonance = response.branch, response.resonance
         problem = branch.problem.refined(resonance.resolution)
         return xr.Dataset(
-            {name: COLUMNS[name].variable(array) for name, array in response.columns.items()},
+            {name: CURVE[name].variable(array) for name, array in response.columns.items()},
             coords={
-                "frequency": FREQUENCY.variable(branch.frequencies),
-                "place": list(self.structure.rig.labels),
+                "frequency": CURVE["frequency"].variable(branch.frequencies),
+                "seen": list(self.structure.rig.labels),
             },
             attrs={
                 "resonance": resonance.frequency,

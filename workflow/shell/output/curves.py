@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array
+from workflow.errors import UserError
 from workflow.shell.output.quantities import ANY, LAST, CurvesOf
-from workflow.shell.output.results import grid_of
 
 # Attributes of a numbered group that say in words what its number stands for.
 TELLING = {
@@ -35,25 +35,29 @@ class Curve:
 
 
 def curves_in(file: h5py.File, wanted: CurvesOf) -> Iterator[Curve]:
-    """Yield the curves of the description ``wanted`` that a file contains."""
-    for place, stood, words in _walk(file, wanted.y.split("/"), "", [], []):
-        path = _with_last(wanted.x, place)
-        for name in stood:
-            path = path.replace(ANY, name, 1)
-        if path in file:
+    """Yield the curves of the description ``wanted`` that a file contains.
+
+    Raises UserError for a file that does not name the axes of its datasets.
+    """
+    for y, words in _walk(file, wanted.y.split("/"), []):
+        if not (y.is_scale or y.dims[0]):
+            raise UserError(
+                f"{file.filename}: of an older version of fretscale; run the case again"
+            )
+        if not wanted.x or wanted.x in y.parent:
             title = ", ".join([wanted.title, *words])
-            yield _curve(title, file[path], file[place], wanted.logarithmic)
+            yield _curve(title, y, wanted)
 
 
-def _curve(title: str, x: h5py.Group | h5py.Dataset, y: h5py.Dataset, logarithmic: bool) -> Curve:
-    if isinstance(x, h5py.Group):
-        grid = grid_of(x)
-        field = y[()] if y.ndim == 2 else y[0]
-        places, values, x_name, x_unit = grid.x.ravel(), field[:, grid.shape[1] // 2], "x", "mm"
+def _curve(title: str, y: h5py.Dataset, wanted: CurvesOf) -> Curve:
+    dims = [_last_part(axis[0]) for axis in y.dims]
+    if dims[-2:] == ["x", "y"]:
+        x, field = y.dims[y.ndim - 2][0], y[()] if y.ndim == 2 else y[0]
+        values = field[:, field.shape[1] // 2]
     else:
-        values = y[()] if y.ndim == 1 else y[:, -1]
-        places, x_name, x_unit = x[()], _last_part(x), x.attrs["unit"]
-    return Curve(title, places, values, x_name, _last_part(y), x_unit, y.attrs["unit"], logarithmic)
+        x, values = y.parent[wanted.x or dims[0]], y[()] if y.ndim == 1 else y[:, -1]
+    names, units = (_last_part(x), _last_part(y)), (x.attrs["unit"], y.attrs["unit"])
+    return Curve(title, x[()], values, *names, *units, wanted.logarithmic)
 
 
 def _last_part(dataset: h5py.Dataset) -> str:
@@ -61,18 +65,17 @@ def _last_part(dataset: h5py.Dataset) -> str:
 
 
 def _walk(
-    group: h5py.Group, parts: list[str], above: str, stood: list[str], words: list[str]
-) -> Iterator[tuple[str, list[str], list[str]]]:
-    """Yield each path that matches a pattern, the groups that replace ``*``, and their wording."""
+    group: h5py.Group, parts: list[str], words: list[str]
+) -> Iterator[tuple[h5py.Dataset, list[str]]]:
+    """Yield the datasets that match a pattern, and the wording of the groups for ``*``."""
     part, *rest = parts
     for name in _names(group, part):
-        place, item, now = f"{above}{name}", group[name], (stood, words)
-        if part == ANY:
-            now = ([*stood, name], [*words, _in_words(item, name)])
+        item = group[name]
+        now = [*words, _in_words(item, name)] if part == ANY else words
         if not rest:
-            yield place, *now
+            yield item, now
         elif isinstance(item, h5py.Group):
-            yield from _walk(item, rest, f"{place}/", *now)
+            yield from _walk(item, rest, now)
 
 
 def _names(group: h5py.Group, part: str) -> list[str]:
@@ -82,12 +85,6 @@ def _names(group: h5py.Group, part: str) -> list[str]:
     if part == LAST:
         return sorted(name for name in group if name.isdecimal())[-1:]
     return [part] if part in group else []
-
-
-def _with_last(path: str, place: str) -> str:
-    """Return the path with each ``-1`` replaced by the part of ``place`` at that position."""
-    there = place.split("/")
-    return "/".join(there[n] if part == LAST else part for n, part in enumerate(path.split("/")))
 
 
 def _in_words(group: h5py.Group, name: str) -> str:

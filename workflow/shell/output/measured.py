@@ -87,7 +87,7 @@ def check_measured(case: Case, curves: Sequence[CurvesOf], layout: Layout) -> No
                 f"measured.{number}.curve: {shown(entry.curve)}: no such curve; allowed: {known}"
             )
         refusals = [
-            _refusal(entry, layout.unit(wanted.x, line), layout.unit(wanted.y, line))
+            _refusal(entry, *layout.units(wanted.y, wanted.x, line))
             for wanted in meant
             for line in (False, True)
         ]

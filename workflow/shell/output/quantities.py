@@ -39,13 +39,14 @@ class SummaryQuantity:
 class CurvesOf:
     """Description of curves: datasets ``y`` against ``x``.
 
-    In the paths, ``*`` stands for any group and ``-1`` for the last numbered one; the groups found
-    in ``y`` are inserted in ``x`` too. The last column of a dataset with several columns is used.
-    If ``x`` is a grid, ``y`` is a field over it (the first component of a vector), and the curve
-    runs along x through the middle. ``logarithmic`` refers to the y axis.
+    In the path of ``y``, ``*`` stands for any group and ``-1`` for the last numbered one. ``x`` is
+    a dataset of the same group, or empty for the coordinate of the first axis. The last column of a
+    dataset with several columns is used. Of a field over the cells of a grid (or the first
+    component of a vector), the curve runs along x through the middle. ``logarithmic`` refers to the
+    y axis.
     """
 
     title: str
-    x: str
     y: str
+    x: str = ""
     logarithmic: bool = False

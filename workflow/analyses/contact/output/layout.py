@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sa_solver.types import Array, LoadHistory
-from workflow.layout.declared import CELLS, GRID, Declarations, Layout, over
+from workflow.layout.declared import GRID, Layout, declared
 
 # Name of the only interface of a contact case.
 BODIES = "bodies"
@@ -22,92 +22,59 @@ class ContactContents:
     increments: int
 
 
-# Dimensions of a vector field along the face, of components x and y.
-VECTOR = f"component {CELLS}"
-
-
-def loads_over(dim: str) -> Declarations:
-    """Return the quantities of the increments of a path or cycle, along a dimension."""
-    return over(
-        dim,
-        P=("N", "normal force on body 2"),
-        Qx=("N", "tangential force on body 2 along x"),
-        Qy=("N", "tangential force on body 2 along y"),
-        Mx=("N mm", "moment of the pressure about x"),
-        My=("N mm", "moment of the pressure about y"),
-        Mz=("N mm", "moment of the shear about z"),
-        Edx=("N mm", "energy dissipated in the increment by slip along x"),
-        Edy=("N mm", "energy dissipated in the increment by slip along y"),
-        sliding=("1", "whether the whole face slides"),
-    )
-
-
-def rigid_motions_over(dim: str) -> Declarations:
-    """Return the rigid motions of the increments of a path, along a dimension."""
-    return over(
-        dim,
-        approach=("mm", "motion of body 1 towards body 2"),
-        shift_x=("mm", "motion of body 1 relative to body 2 along x"),
-        shift_y=("mm", "motion of body 1 relative to body 2 along y"),
-        tilt_x=("rad", "rotation of body 1 relative to body 2 about x"),
-        tilt_y=("rad", "rotation of body 1 relative to body 2 about y"),
-        twist=("rad", "rotation of body 1 relative to body 2 about z"),
-    )
-
-
-# Loads of a cycle; the last two are those of a mix of missions.
-LOAD_HISTORY = {
-    **loads_over("increment"),
-    **over(
-        "increment",
-        share=("1", "of the mission's cycles among all cycles of the mix"),
-        block=("1", "mission of the mix, counted from 0"),
-    ),
-}
-TRACTIONS = {
-    **over(CELLS, pressure=("MPa", "contact pressure")),
-    **over(
-        VECTOR,
-        shear=(
-            "MPa",
-            "shear on body 2, x and y; in a wear run µp where the structure slips, else 0",
-        ),
-        slip=("mm", "slip of body 2 over body 1 in the increment, x and y"),
-    ),
-}
-# Results of a contact case.
-LAYOUT = Layout(
-    {
-        f"grid/{BODIES}": GRID,
-        f"surfaces/{BODIES}": over(CELLS, height=("mm", "gap before loading")),
-        "path": {
-            **loads_over("row"),
-            **rigid_motions_over("row"),
-            **over(
-                "row",
-                bulk_stress_1=("MPa", "stress along x in body 1 far below the contact"),
-                bulk_stress_2=("MPa", "stress along x in body 2 far above the contact"),
-            ),
-        },
-        "history": {
-            **over("increment", increment=("1", "row of the path, counted from 1")),
-            **loads_over("increment"),
-            **rigid_motions_over("increment"),
-        },
-        f"contact/{BODIES}/<increment>": {
-            **TRACTIONS,
-            **over(
-                CELLS,
-                gap=("mm", "distance of the deformed faces"),
-                sticking=("1", "whether the cell is pressed and its shear below µp"),
-            ),
-        },
-    },
-    coordinates=dict.fromkeys(GRID, f"grid/{BODIES}"),
+LOADS = """
+    P | N | {dim} | normal force on body 2
+    Qx | N | {dim} | tangential force on body 2 along x
+    Qy | N | {dim} | tangential force on body 2 along y
+    Mx | N mm | {dim} | moment of the pressure about x
+    My | N mm | {dim} | moment of the pressure about y
+    Mz | N mm | {dim} | moment of the shear about z
+    Edx | N mm | {dim} | energy dissipated in the increment by slip along x
+    Edy | N mm | {dim} | energy dissipated in the increment by slip along y
+    sliding | 1 | {dim} | whether the whole face slides
+"""
+"""Quantities of the increments of a path or a cycle, along a dimension."""
+RIGID_MOTIONS = """
+    approach | mm | {dim} | motion of body 1 towards body 2
+    shift_x | mm | {dim} | motion of body 1 relative to body 2 along x
+    shift_y | mm | {dim} | motion of body 1 relative to body 2 along y
+    tilt_x | rad | {dim} | rotation of body 1 relative to body 2 about x
+    tilt_y | rad | {dim} | rotation of body 1 relative to body 2 about y
+    twist | rad | {dim} | rotation of body 1 relative to body 2 about z
+"""
+LOAD_HISTORY = f"""{LOADS.format(dim="increment")}
+    share | 1 | increment | of the mission's cycles among all cycles of the mix
+    block | 1 | increment | mission of the mix, counted from 0
+"""
+"""Loads of a cycle; the last two are those of a mix of missions."""
+TRACTIONS = """
+    pressure | MPa | {cells} | contact pressure
+    shear | MPa | {vectors} | shear on body 2, x and y; in a wear run µp where the structure slips,
+        else 0
+    slip | mm | {vectors} | slip of body 2 over body 1 in the increment, x and y
+"""
+ON_GRID = TRACTIONS.format(cells="x y", vectors="component x y")
+LAYOUT = Layout.read(
+    f"""
+grid/{BODIES}{GRID}
+surfaces/{BODIES}
+    height | mm | x y | gap before loading
+path{LOADS.format(dim="row")}{RIGID_MOTIONS.format(dim="row")}
+    bulk_stress_1 | MPa | row | stress along x in body 1 far below the contact
+    bulk_stress_2 | MPa | row | stress along x in body 2 far above the contact
+history
+    increment | 1 | increment | row of the path, counted from 1
+    {LOADS.format(dim="increment")}{RIGID_MOTIONS.format(dim="increment")}
+contact/{BODIES}/<increment>{ON_GRID}
+    gap | mm | x y | distance of the deformed faces
+    sticking | 1 | x y | whether the cell is pressed and its shear below µp
+""",
+    x=f"grid/{BODIES}",
+    y=f"grid/{BODIES}",
 )
 
 
 def load_columns(loads: LoadHistory) -> dict[str, Array]:
     """Return the columns of a load history, with those of a mix only if there is one."""
-    names = LOAD_HISTORY if loads.mixed else loads_over("increment")
+    names = declared(LOAD_HISTORY if loads.mixed else LOADS)
     return {name: getattr(loads, name) for name in names}

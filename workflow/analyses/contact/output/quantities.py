@@ -36,18 +36,10 @@ FORCES = "P", "Qx", "Qy"
 BY_INCREMENTS = "of the increments of the load"
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
-    CurvesOf(
-        "pressure along x in the middle, last increment",
-        "grid/bodies",
-        "contact/bodies/-1/pressure",
-    ),
-    CurvesOf(
-        "shear along x in the middle, last increment",
-        "grid/bodies",
-        "contact/bodies/-1/shear",
-    ),
-    CurvesOf("tangential force over motion", "history/shift_x", "history/Qx"),
-    CurvesOf("normal force over approach", "history/approach", "history/P"),
+    CurvesOf("pressure along x in the middle, last increment", "contact/bodies/-1/pressure"),
+    CurvesOf("shear along x in the middle, last increment", "contact/bodies/-1/shear"),
+    CurvesOf("tangential force over motion", "history/Qx", "shift_x"),
+    CurvesOf("normal force over approach", "history/P", "approach"),
 )
 
 

@@ -17,215 +17,116 @@ from workflow.analyses.vibration.output.outcome import (
     RESONANCE,
     RESPONSES,
 )
-from workflow.layout.declared import Declarations, Layout, over
+from workflow.layout.declared import Declarations, Layout, declared
 from workflow.models.vibration.amount import ExcitationSize
-from workflow.models.vibration.motions import COLUMNS, SLIPS
-from workflow.models.vibration.results import linear_limits
+from workflow.models.vibration.layout import AMPLITUDES, MOTIONS, linear_limits
 
 CONVENTION = "x(t) = sum of Re(c_k exp(i k 2 pi f t)), forces being sines at t = 0"
-LOOKED_AT = "half the peak-to-peak motion of the reported point"
+_LOOKED_AT = "half the peak-to-peak motion of the reported point"
+_STABILITY = """
+    stability | 1 | {dim} | 1 stable, -1 unstable, 0 unknown
+    multiplier | 1 | {dim} | size of the largest multiplier in a period, NaN where unknown
+    multiplier_error | 1 | {dim} | estimated error of the largest multiplier, NaN where unknown
+    unstable_multipliers | 1 | {dim} | number of multipliers in a period certainly beyond 1
+"""
+# A curve may fold back, and a frequency of one motion stands below it: points, not frequencies, are
+# its dimension.
+_BRANCH = f"""
+    frequency | Hz | point | frequency of the force, in the order of the curve
+    speed | rad/s | point | of the engine, by its order
+    {AMPLITUDES.format(dim="point")}{MOTIONS.format(dim="point")}{_STABILITY.format(dim="point")}
+"""
+_HARMONICS = f"""
+    harmonic | 1 | harmonic | k
+    displacement | mm | {{along}} harmonic place | c_k of places against the ground, {{order}}:
+        {CONVENTION}
+    joint_displacement | mm | {{along}} harmonic joint direction | c_k of joints, {{order}}:
+        {CONVENTION}
+    joint_force | N | {{along}} harmonic joint direction | c_k of what joints resist with,
+        {{order}}: {CONVENTION}
+"""
 
 
 def layout_of(amount: ExcitationSize) -> Layout:
     """Return the layout of a case whose excitation has an amount: a force or a level."""
-    response = f"{RESPONSES}/<response>"
-    along_force = {**_stability(amount.name), **_motions(amount.name)}
-    # A curve may fold back, and a frequency of one motion stands below it: points, not frequencies,
-    # are its dimension.
-    branch = {
-        **over(
-            "point",
-            frequency=("Hz", "frequency of the force, in the order of the curve"),
-            speed=("rad/s", "of the engine, by its order"),
-        ),
-        **{
-            name: COLUMNS[name]._replace(dims=("point", "seen"))
-            for name in ("amplitude", "absolute_amplitude")
-        },
-        **_motions("point"),
-        **_stability("point"),
-    }
-    bifurcations = bifurcation_columns(amount)
-    return Layout(
-        {
-            "linear": linear_limits(amount),
-            "names": {
-                **over("place", places=("1", "whose displacements have harmonics")),
-                **over(
-                    "joint direction",
-                    joints=("1", "stretch of every direction of every joint"),
-                ),
-            },
-            DIAMETERS: {
-                **over("diameters", diameters=("1", "nodal diameters of a wave")),
-                **over(
-                    "diameters mode",
-                    free=("Hz", f"{_OF_EACH}, without the joints"),
-                    stuck=("Hz", f"{_OF_EACH}, all joints stuck"),
-                ),
-            },
-            "contact": over(
-                "joint",
-                x=("mm", "of each joint on the contact plane"),
-                y=("mm", "of each joint on the contact plane"),
-                gap=("mm", "gap of the bodies without load"),
-                area=("mm^2", "area that belongs to each joint"),
-                normal_force=("N", "of each joint at rest"),
-                normal_displacement=("mm", "closing of each joint by the load at rest"),
-            ),
-            response: branch,
-            f"{response}/{NODES}": _NODES,
-            f"{response}/{RESONANCE}": _CYCLE,
-            f"{response}/{LOOPS}/<loop>": over(
-                "point",
-                displacement=("mm", "between the targets, or the mean of the joints, in a cycle"),
-                force=("N", "force of all joints together along it"),
-                expansion=("N", "the same force in the harmonics of the motion alone"),
-            ),
-            f"{response}/{AT}": {
-                **over(
-                    "motion",
-                    frequency=("Hz", "frequency of the force; motions in the order of the curve"),
-                ),
-                "amplitude": branch["amplitude"]._replace(dims=("motion", "seen")),
-                "absolute_amplitude": branch["absolute_amplitude"]._replace(
-                    dims=("motion", "seen")
-                ),
-                **_motions("motion"),
-                **over(
-                    "motion",
-                    error=(
-                        "1",
-                        "estimated error of vibration or energy lost, due to harmonics and samples",
-                    ),
-                ),
-            },
-            f"{response}/{HARMONICS}/{CURVE}": {
-                **over("point", frequency=("Hz", "f, in the order of the curve")),
-                **_harmonics("by point of the curve and harmonic", "point"),
-            },
-            f"{response}/{HARMONICS}/<motion>": {
-                **over("", frequency=("Hz", "f, of the motion")),
-                **_harmonics("by harmonic", ""),
-            },
-            f"{response}/{BIFURCATIONS}": bifurcations,
-            BACKBONE: {
-                **over(amount.name, **{amount.name: (amount.unit, amount.description)}),
-                **over(
-                    amount.name,
-                    frequency=(
-                        "Hz",
-                        "phase resonance: the driven point lags the force by 90 degrees",
-                    ),
-                    amplitude=("mm", LOOKED_AT),
-                ),
-                **along_force,
-            },
-            f"{BACKBONE}/{BIFURCATIONS}": bifurcations,
-            f"{FURTHER}/<branch>": branch,
-            f"{FURTHER}/<branch>/{BIFURCATIONS}": bifurcations,
-            f"{FORCE_SWEEPS}/<sweep>": {
-                **over(
-                    amount.name,
-                    **{
-                        amount.name: (
-                            amount.unit,
-                            f"{amount.description}, in the order of the curve",
-                        )
-                    },
-                ),
-                **over(amount.name, amplitude=("mm", LOOKED_AT)),
-                **along_force,
-            },
-            f"{FORCE_SWEEPS}/<sweep>/{BIFURCATIONS}": bifurcations,
-            f"{MODES}/<mode>": _MODE,
-        }
-    )
-
-
-def _motions(dim: str) -> Declarations:
-    """Return results of structure and joints in motions along a dimension."""
-    return {
-        name: column._replace(dims=(dim,))
-        for name, column in COLUMNS.items()
-        if column.dims == ("point",)
-    }
-
-
-def _stability(dim: str) -> Declarations:
-    of, unknown = "of a small deviation in a period", "NaN where unknown"
-    return over(
-        dim,
-        stability=("1", "1 stable, -1 unstable, 0 unknown"),
-        multiplier=("1", f"size of the largest multiplier {of}, {unknown}"),
-        multiplier_error=("1", f"estimated error of the largest multiplier, {unknown}"),
-        unstable_multipliers=("1", f"number of multipliers {of} certainly beyond 1"),
-    )
+    response, name = f"{RESPONSES}/<response>", amount.name
+    along_force = f"""
+    amplitude | mm | {name} | {_LOOKED_AT}
+    {_STABILITY.format(dim=name)}{MOTIONS.format(dim=name)}"""
+    return Layout.read(f"""
+linear{linear_limits(amount)}
+names
+    places | 1 | place | whose displacements have harmonics
+    joints | 1 | joint direction | stretch of every direction of every joint
+{DIAMETERS}
+    diameters | 1 | diameters | nodal diameters of a wave
+    free | Hz | diameters mode | lowest natural frequencies, without the joints
+    stuck | Hz | diameters mode | lowest natural frequencies, all joints stuck
+contact
+    x, y | mm | joint | of each joint on the contact plane
+    gap | mm | joint | gap of the bodies without load
+    area | mm^2 | joint | area that belongs to each joint
+    normal_force | N | joint | of each joint at rest
+    normal_displacement | mm | joint | closing of each joint by the load at rest
+{response}, {FURTHER}/<branch>{_BRANCH}
+{response}/{NODES}
+    slip | 1 | point joint | share of the cycle in which each joint slips, by point of the curve
+    separated | 1 | point joint | share of the cycle in which each joint is open
+    energy | N mm | point joint | energy that each joint dissipates in a cycle
+{response}/{RESONANCE}
+    displacement | mm | sample joint direction | of each joint along x, y, and its closing, in time
+    force | N | sample joint direction | of each joint along x, y and its pressure
+    state | 1 | sample joint | state of each joint: 0 sticks, 1 slips, 2 is open
+{response}/{LOOPS}/<loop>
+    displacement | mm | point_of_loop | between the targets, or the mean of the joints, in a cycle
+    force | N | point_of_loop | force of all joints together along it
+    expansion | N | point_of_loop | the same force in the harmonics of the motion alone
+{response}/{AT}
+    frequency | Hz | motion | frequency of the force; motions in the order of the curve
+    {AMPLITUDES.format(dim="motion")}{MOTIONS.format(dim="motion")}
+    error | 1 | motion | estimated error of vibration or energy lost, due to harmonics and
+        samples
+{response}/{HARMONICS}/{CURVE}
+    frequency | Hz | point | f, in the order of the curve
+    {_HARMONICS.format(along="point", order="by point of the curve and harmonic")}
+{response}/{HARMONICS}/<motion>
+    frequency | Hz | | f, of the motion
+    {_HARMONICS.format(along="", order="by harmonic")}
+{BACKBONE}
+    {name} | {amount.unit} | {name} | {amount.description}
+    frequency | Hz | {name} | phase resonance: the driven point lags the force by 90
+        degrees
+    {along_force}
+{FORCE_SWEEPS}/<sweep>
+    {name} | {amount.unit} | {name} | {amount.description}, in the order of the curve
+    {along_force}
+{response}/{BIFURCATIONS}, {FURTHER}/<branch>/{BIFURCATIONS}{_bifurcations(amount)}
+{BACKBONE}/{BIFURCATIONS}, {FORCE_SWEEPS}/<sweep>/{BIFURCATIONS}{_bifurcations(amount)}
+{MODES}/<mode>
+    amplitude | mm | modal_amplitude | {_LOOKED_AT}, in the order of the curve
+    modal_amplitude | t^0.5 mm | modal_amplitude | norm of harmonic 1 by the mass
+    frequency | Hz | modal_amplitude | of the mode
+    damping | 1 | modal_amplitude | damping ratio of the mode: energy lost over
+        2ω ∫ x'ᵀ M x' dt
+    energy_per_cycle | N mm | modal_amplitude | energy that the joints dissipate in a cycle
+    slip | 1 | modal_amplitude | share of the cycle in which a joint slips, mean of those touching
+    frequency_error | 1 | modal_amplitude | estimated error due to harmonics and samples
+    damping_error | 1 | modal_amplitude | estimated error due to harmonics and samples, of the ratio
+""")
 
 
 def bifurcation_columns(amount: ExcitationSize) -> Declarations:
     """Return the columns of bifurcations other than their kinds."""
-    along = "bifurcation"
-    return {
-        **over(along, frequency=("Hz", "of the force")),
-        **over(along, **{amount.name: (amount.unit, amount.description)}),
-        **over(
-            along,
-            amplitude=("mm", LOOKED_AT),
-            multiplier=("1", "size of the one that passes the circle there"),
-            multiplier_angle=("rad", "its angle: 0 of a fold, pi where the period doubles"),
-            unstable_before=(
-                "1",
-                "number of multipliers beyond the circle before, NaN where unknown",
-            ),
-            unstable_after=("1", "and at the point after"),
-        ),
-    }
+    return declared(_bifurcations(amount))
 
 
-def _harmonics(order: str, along: str) -> Declarations:
-    """Return complex coefficients of motions, by harmonic and ``along`` further dimensions."""
-    joints = f"{along} harmonic joint direction"
-    return {
-        **over("harmonic", harmonic=("1", "k")),
-        **over(
-            f"{along} harmonic place",
-            displacement=("mm", f"c_k of places against the ground, {order}: {CONVENTION}"),
-        ),
-        **over(
-            joints,
-            joint_displacement=("mm", f"c_k of joints, {order}: {CONVENTION}"),
-            joint_force=("N", f"c_k of what joints resist with, {order}: {CONVENTION}"),
-        ),
-    }
-
-
-_OF_EACH = "lowest natural frequencies of each number of nodal diameters"
-_SHARE = "share of the cycle in which each joint"
-_NODES = over(
-    "point joint",
-    slip=("1", f"{_SHARE} slips, by point of the curve"),
-    separated=("1", f"{_SHARE} is open"),
-    energy=("N mm", "energy that each joint dissipates in a cycle"),
-)
-_CYCLE = {
-    **over(
-        "sample joint direction",
-        displacement=("mm", "of each joint along x, y and its closing, at times of a cycle"),
-        force=("N", "of each joint along x, y and its pressure"),
-    ),
-    **over("sample joint", state=("1", "state of each joint: 0 sticks, 1 slips, 2 is open")),
-}
-_RICHER = "estimated error due to harmonics and samples"
-_ALONG_MODE = "modal_amplitude"
-_MODE = over(
-    _ALONG_MODE,
-    amplitude=("mm", f"{LOOKED_AT}, in the order of the curve"),
-    modal_amplitude=("t^0.5 mm", "amplitude of the mode: norm of harmonic 1 by the mass"),
-    frequency=("Hz", "of the mode"),
-    damping=("1", "damping ratio of the mode: energy lost over 2ω ∫ x'ᵀ M x' dt"),
-    energy_per_cycle=("N mm", "energy that the joints dissipate in a cycle"),
-    slip=("1", SLIPS),
-    frequency_error=("1", _RICHER),
-    damping_error=("1", f"{_RICHER}, of the ratio"),
-)
+def _bifurcations(amount: ExcitationSize) -> str:
+    return f"""
+    frequency | Hz | bifurcation | of the force
+    {amount.name} | {amount.unit} | bifurcation | {amount.description}
+    amplitude | mm | bifurcation | {_LOOKED_AT}
+    multiplier | 1 | bifurcation | size of the one that passes the circle there
+    multiplier_angle | rad | bifurcation | its angle: 0 of a fold, pi where the period doubles
+    unstable_before | 1 | bifurcation | multipliers beyond the circle before, NaN where unknown
+    unstable_after | 1 | bifurcation | and at the point after
+"""

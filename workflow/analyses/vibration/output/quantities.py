@@ -54,15 +54,10 @@ MODE = {
 }
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
-    CurvesOf(
-        "amplitude",
-        "responses/*/frequency",
-        "responses/*/amplitude",
-        logarithmic=True,
-    ),
-    CurvesOf("loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force"),
-    CurvesOf("phase resonance", "backbone/force", "backbone/frequency"),
-    CurvesOf("mode", "modes/*/amplitude", "modes/*/frequency"),
+    CurvesOf("amplitude", "responses/*/amplitude", "frequency", logarithmic=True),
+    CurvesOf("loop", "responses/*/loops/-1/force", "displacement"),
+    CurvesOf("phase resonance", "backbone/frequency"),
+    CurvesOf("mode", "modes/*/frequency", "amplitude"),
 )
 
 

@@ -32,7 +32,7 @@ from workflow.analyses.vibration.output.outcome import (
 from workflow.analyses.vibration.stability import bifurcation_arrays
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
-from workflow.layout.declared import Layout
+from workflow.layout.declared import Arrays
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
@@ -46,10 +46,8 @@ TO_RPM = 30.0 / pi  # rad/s to rpm
 
 def write_vibration_output(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
-    folder, reporter = run.folder, run.reporter
-    with reporter.stage("results"):
+    with run.reporter.stage("results"):
         _write_results(outcome, run)
-        _write_tables(outcome, folder)
     run.draw(outcome.contents)
     finish(run, _summary(outcome), _lines(outcome))
 
@@ -58,54 +56,97 @@ def write_vibration_output(outcome: VibrationOutcome, run: Run[VibrationCase]) -
 
 
 def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
-    case = outcome.case
+    """Write results, and all curves as CSV."""
+    case, folder, layout = outcome.case, run.folder, layout_of(outcome.case.amount)
     attributes = {
         "analysis": case.analysis,
         "law": case.law_names,
         "seen": list(outcome.labels),
         "engine_order": case.engine_order,
     }
-    with run_results(run, case, layout_of(case.amount), attributes) as writer:
+    with run_results(run, case, layout, attributes) as writer:
         writer.put_contents(outcome.contents)
         limits = {name: outcome.numbers[name] for name in ("free", "stuck", "sliding")}
         writer.put("linear", outcome.linear, **limits)
         writer.put("names", outcome.names)
         if outcome.diameters is not None:
-            ring = outcome.numbers[RING]
-            writer.put(DIAMETERS, outcome.diameters, **ring)
+            writer.put(DIAMETERS, outcome.diameters, **outcome.numbers[RING])
+            path = folder.reserve(f"{DIAMETERS}.csv", "natural frequencies, over nodal diameters")
+            write_curves(path, outcome.diameters, layout.datasets(DIAMETERS))
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
-            _put_response(writer, f"{RESPONSES}/{number:05d}", case.amount, response)
-        if outcome.backbone is not None:
-            writer.put(BACKBONE, outcome.backbone.arrays, **outcome.backbone.numbers)
-            _put_bifurcations(writer, BACKBONE, outcome.backbone.bifurcations, case.amount)
-        for number, branch in enumerate(outcome.further):
-            place = f"{FURTHER}/{number:05d}"
-            writer.put(place, branch.arrays, **branch.numbers)
-            _put_bifurcations(writer, place, branch.bifurcations, case.amount)
-        for number, sweep in enumerate(outcome.force_sweeps):
-            place = f"{FORCE_SWEEPS}/{number:05d}"
-            writer.put(place, sweep.arrays, **sweep.numbers)
-            _put_bifurcations(writer, place, sweep.bifurcations, case.amount)
-        for number, mode in enumerate(outcome.modes):
-            place = f"{MODES}/{number:05d}"
-            writer.put(place, mode.arrays, **mode.numbers)
+            _put_response(writer, number, outcome, response, folder)
+        for place, name, what, curve in _curves(outcome):
+            writer.put(place, curve.arrays, **curve.numbers)
+            _put_bifurcations(writer, place, curve.bifurcations, case.amount)
+            write_curves(folder.reserve(f"{name}.csv", what), curve.arrays, layout.datasets(place))
+    if found := list(_every_bifurcation(outcome)):
+        path = folder.reserve(f"{BIFURCATIONS}.csv", "where the stability of motions changes")
+        columns: dict[str, list[Any]] = {
+            "curve": [curve for curve, _ in found],
+            "kind": [each["kind"] for _, each in found],
+        }
+        for name, declared in bifurcation_columns(case.amount).items():
+            columns[heading(name, declared.unit)] = [each[name] for _, each in found]
+        write_table(path, columns, DIGITS)
+
+
+def _curves(outcome: VibrationOutcome) -> Iterator[tuple[str, str, str, Curves]]:
+    """Yield all curves but the responses, with group, name of the table, and what it is."""
+    amount = outcome.case.amount
+    over = f"over the {amount.name}"
+    if outcome.backbone is not None:
+        yield BACKBONE, BACKBONE, f"phase resonance, {over}", outcome.backbone
+    for number, branch in enumerate(outcome.further):
+        what = f"further branch {amount.under(branch.numbers[amount.name])}, over frequency"
+        yield f"{FURTHER}/{number:05d}", f"further_branch_{number:05d}", what, branch
+    for number, sweep in enumerate(outcome.force_sweeps):
+        what = f"response at {sweep.numbers['frequency']:g} Hz, {over}"
+        yield f"{FORCE_SWEEPS}/{number:05d}", f"force_sweep_{number:05d}", what, sweep
+    for number, mode in enumerate(outcome.modes):
+        what = f"mode {mode.numbers['mode']}, over its amplitude"
+        yield f"{MODES}/{number:05d}", f"mode_{mode.numbers['mode']:05d}", what, mode
 
 
 def _put_response(
-    writer: ResultsWriter, place: str, amount: ExcitationSize, response: Response
+    writer: ResultsWriter,
+    number: int,
+    outcome: VibrationOutcome,
+    response: Response,
+    folder: OutputFolder,
 ) -> None:
+    """Write a response, its harmonics, loops and motions at given frequencies, and their tables."""
+    amount, place = outcome.case.amount, f"{RESPONSES}/{number:05d}"
+    under, layout = amount.under(response.force), layout_of(amount)
+
+    def write_csv(name: str, what: str, curves: Arrays, *groups: str) -> None:
+        path = folder.reserve(f"{name}_{number:05d}.csv", what)
+        declared = {k: v for group in groups for k, v in layout.datasets(group).items()}
+        write_curves(path, curves, declared)
+
     put_response_curves(writer, place, amount, response)
-    writer.put(f"{place}/{NODES}", response.nodes)
+    write_csv("frf", f"response {under}, over frequency", response.curves, place)
+    nodes = f"{place}/{NODES}"
+    writer.put(nodes, response.nodes)
+    frequency = {"frequency": response.curves["frequency"]}
+    what = f"what each joint does {under}"
+    write_csv("joints", what, {**frequency, **response.nodes}, place, nodes)
     if response.resonance is not None:
         writer.put(f"{place}/{RESONANCE}", response.resonance)
-    for number, loop in enumerate(response.loops):
-        writer.put(f"{place}/{LOOPS}/{number:05d}", loop.arrays, **loop.numbers)
+    for count, loop in enumerate(response.loops):
+        writer.put(f"{place}/{LOOPS}/{count:05d}", loop.arrays, **loop.numbers)
+    for loop in response.loops[-1:]:
+        write_csv("loop", f"loop of the joints {under}", loop.arrays, f"{place}/{LOOPS}/-")
     if response.answers is not None:
-        writer.put(f"{place}/{AT}", response.answers.arrays)
+        answers = response.answers.arrays
+        writer.put(f"{place}/{AT}", answers)
+        write_csv("at", f"motions {under}, as requested", answers, f"{place}/{AT}")
     for of, arrays in response.harmonics.items():
         writer.put(f"{place}/{HARMONICS}/{of}", arrays)
+    what = f"harmonics of places and joints {under}, at resonance and as requested"
+    path = folder.reserve(f"harmonics_{number:05d}.csv", what)
+    write_harmonics(path, outcome.names, response)
     _put_bifurcations(writer, place, response.bifurcations, amount)
 
 
@@ -125,68 +166,6 @@ def put_response_curves(
     """Write the curves of a response and its numbers."""
     numbers = {amount.name: response.force, **response.numbers}
     writer.put(place, response.curves, **numbers)
-
-
-# --- tables -------------------------------------------------------------------------------------
-
-
-def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
-    """Write responses, backbone, force sweeps and all other curves as CSV."""
-    layout = layout_of(outcome.case.amount)
-    _write_responses(outcome, folder, layout)
-    if outcome.diameters is not None:
-        path = folder.reserve(f"{DIAMETERS}.csv", "natural frequencies, over nodal diameters")
-        write_curves(path, outcome.diameters, layout.datasets(DIAMETERS))
-    if outcome.backbone is not None:
-        path = folder.reserve(
-            f"{BACKBONE}.csv", f"phase resonance, over the {outcome.case.amount.name}"
-        )
-        write_curves(path, outcome.backbone.arrays, layout.datasets(BACKBONE))
-    for number, sweep in enumerate(outcome.force_sweeps):
-        what = f"response at {sweep.numbers['frequency']:g} Hz, over the {outcome.case.amount.name}"
-        path = folder.reserve(f"force_sweep_{number:05d}.csv", what)
-        write_curves(path, sweep.arrays, layout.datasets(f"{FORCE_SWEEPS}/-"))
-    for mode in outcome.modes:
-        what = f"mode {mode.numbers['mode']}, over its amplitude"
-        path = folder.reserve(f"mode_{mode.numbers['mode']:05d}.csv", what)
-        write_curves(path, mode.arrays, layout.datasets(f"{MODES}/-"))
-    amount = outcome.case.amount
-    for number, branch in enumerate(outcome.further):
-        what = f"further branch {amount.under(branch.numbers[amount.name])}, over frequency"
-        path = folder.reserve(f"further_branch_{number:05d}.csv", what)
-        write_curves(path, branch.arrays, layout.datasets(f"{FURTHER}/-"))
-    found = list(_every_bifurcation(outcome))
-    if found:
-        path = folder.reserve(f"{BIFURCATIONS}.csv", "where the stability of motions changes")
-        columns: dict[str, list[Any]] = {
-            "curve": [curve for curve, _ in found],
-            "kind": [each["kind"] for _, each in found],
-        }
-        for name, declared in bifurcation_columns(amount).items():
-            columns[heading(name, declared.unit)] = [each[name] for _, each in found]
-        write_table(path, columns, DIGITS)
-
-
-def _write_responses(outcome: VibrationOutcome, folder: OutputFolder, layout: Layout) -> None:
-    """Write responses, their harmonics, their finest loops, and motions at given frequencies."""
-    place = f"{RESPONSES}/-"
-    declared = layout.datasets(place)
-    for number, response in enumerate(outcome.responses):
-        under = f"{outcome.case.amount.under(response.force)}"
-        path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
-        write_curves(path, response.curves, declared)
-        path = folder.reserve(f"joints_{number:05d}.csv", f"what each joint does {under}")
-        nodes = {"frequency": response.curves["frequency"], **response.nodes}
-        write_curves(path, nodes, {**declared, **layout.datasets(f"{place}/{NODES}")})
-        if response.loops:
-            path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
-            write_curves(path, response.loops[-1].arrays, layout.datasets(f"{place}/{LOOPS}/-"))
-        if response.answers is not None:
-            path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as requested")
-            write_curves(path, response.answers.arrays, layout.datasets(f"{place}/{AT}"))
-        what = f"harmonics of places and joints {under}, at resonance and as requested"
-        path = folder.reserve(f"harmonics_{number:05d}.csv", what)
-        write_harmonics(path, outcome.names, response)
 
 
 def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping[str, Any]]]:

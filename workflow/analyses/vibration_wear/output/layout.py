@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from workflow.analyses.vibration.output import layout as vibration
 from workflow.analyses.vibration.output.outcome import RESPONSES
 from workflow.analyses.vibration_wear.output.outcome import (
@@ -15,111 +17,75 @@ from workflow.analyses.vibration_wear.output.outcome import (
     SLIDERS,
     WORN,
 )
-from workflow.layout.declared import CELLS, GRID, Declarations, Layout, over
+from workflow.layout.declared import GRID, Layout
 from workflow.models.vibration.amount import ExcitationSize
 
 
 def layout_of(amount: ExcitationSize) -> Layout:
     """Return the layout of a case whose excitation has an amount: a force or a level."""
     response = f"{RESPONSES}/<response>"
-    return Layout(
-        {
-            "grid": GRID,
-            PLACES: _PLACES,
-            EVOLUTION: _EVOLUTION,
-            f"{WORN}/<state>/{CONTACT}": {
-                **over(
-                    CELLS,
-                    pressure=("MPa", "at rest"),
-                    gap=("mm", "at rest"),
-                    onset=("mm", "motion of the joint from rest up to which each cell sticks"),
-                ),
-                **_worn(CELLS),
-                **over(CELLS, energy=("N/mm", "per area, in such a cycle")),
-            },
-            f"{WORN}/<state>/{SLIDERS}": over(
-                "slider",
-                reach=("mm", "motion at which each slider gives way"),
-                stiffness=("N/mm", "of its spring"),
-                normal_load=("N", "that presses it"),
-                energy=("N mm", "that it dissipates in a cycle under the force that wears"),
-            ),
-            f"{WORN}/<state>/{LOOP}": over(
-                "point",
-                displacement=(
-                    "mm",
-                    "of the joint or the mean of all, or between the targets, under the force that "
-                    "wears",
-                ),
-                force=("N", "of the joint along it"),
-            ),
-            f"{WORN}/<state>/{HALF_SPACE}": over(
-                "point",
-                displacement=("mm", "of the bodies, as far to and fro"),
-                force=("N", "between them, of the whole tangential problem"),
-            ),
-            f"{WORN}/<state>/{NODES}": {
-                **over(
-                    "node",
-                    gap=("mm", "of the worn bodies without load; below 0 what it closes"),
-                    normal_force=("N", "of each node at rest"),
-                ),
-                **_worn("node"),
-                **over("node", energy=("N mm", "that each node dissipates in such a cycle")),
-            },
-            f"{WORN}/<state>/{response}": vibration.layout_of(amount).datasets(response),
-        },
-        coordinates=dict.fromkeys(GRID, "grid"),
-    )
+    curves = vibration.layout_of(amount).datasets(response)
+    return replace(_LAYOUT, groups={**_LAYOUT.groups, f"{WORN}/<state>/{response}": curves})
 
 
-def _worn(dims: str) -> Declarations:
-    """Return wear and slip at cells or nodes."""
-    return over(
-        dims,
-        depth_1=("mm", "worn from body 1"),
-        depth_2=("mm", "worn from body 2"),
-        path=("mm", "of slip in a cycle under the force that wears"),
-    )
-
-
-_OVER_CYCLES, _OF_FORCES = "cycles", "cycles excitation"
-_ON_PLANE = "of each node on the contact plane, from the middle of all"
-_PLACES = {
-    **over("node", area=("mm^2", "area that belongs to each node")),
-    **over("node axis", normal=("1", "out of body 1, what the joints' points meet")),
-    **over("node axis", **{POSITION: ("mm", "of each node, x, y, z")}),
-    **over(
-        "node", x=("mm", _ON_PLANE), y=("mm", _ON_PLANE), name=("1", "of the point of each contact")
-    ),
-}
-_EVOLUTION = {
-    **over(
-        _OVER_CYCLES,
-        cycles=("1", "under the force that wears"),
-        energy=("N mm", "dissipated so far"),
-        volume=("mm^3", "worn from both bodies"),
-        depth=("mm", "largest of both bodies together"),
-        area=("mm^2", "in contact at rest"),
-        touching=("1", "nodes in contact at rest"),
-        peak_pressure=("MPa", "at rest"),
-        step_error=("1", "that wear steps leave of depth or volume, the larger"),
-        friction=("1", "coefficient"),
-        stiffness=(
-            "N/mm",
-            "of all that touches, stuck; over what opens between the targets, or their mean",
-        ),
-        full_slip=("mm", "motion of the joint from rest at which all of it slides"),
-        stroke=("mm", "of the joint from end to end, under the force that wears"),
-        frequency=("Hz", "of the motion that wears"),
-        energy_per_cycle=("N mm", "that joints dissipate under the force that wears"),
-        work_per_cycle=("N mm", "of the force that wears"),
-        damped_per_cycle=("N mm", "by the damping of the structure, in the same motion"),
-    ),
-    **over("cycles mode", stuck=("Hz", "natural frequencies with the contact stuck")),
-    **over(
-        _OF_FORCES,
-        resonance=("Hz", "under each force"),
-        receptance=("mm/N", "largest amplitude of the last mass over the force, under each"),
-    ),
-}
+# Wear and slip at cells or nodes.
+_WORN = """
+    depth_1, depth_2 | mm | {dims} | worn from body #
+    path | mm | {dims} | of slip in a cycle under the force that wears
+"""
+_LAYOUT = Layout.read(
+    f"""
+grid{GRID}
+{PLACES}
+    area | mm^2 | node | area that belongs to each node
+    normal | 1 | node axis | out of body 1, what the joints' points meet
+    {POSITION} | mm | node axis | of each node, x, y, z
+    x, y | mm | node | of each node on the contact plane, from the middle of all
+    name | 1 | node | of the point of each contact
+{EVOLUTION}
+    cycles | 1 | cycles | under the force that wears
+    energy | N mm | cycles | dissipated so far
+    volume | mm^3 | cycles | worn from both bodies
+    depth | mm | cycles | largest of both bodies together
+    area | mm^2 | cycles | in contact at rest
+    touching | 1 | cycles | nodes in contact at rest
+    peak_pressure | MPa | cycles | at rest
+    step_error | 1 | cycles | that wear steps leave of depth or volume, the larger
+    friction | 1 | cycles | coefficient
+    stiffness | N/mm | cycles | of all that touches, stuck, by the opening of targets, or mean
+    full_slip | mm | cycles | motion of the joint from rest at which all of it slides
+    stroke | mm | cycles | of the joint from end to end, under the force that wears
+    frequency | Hz | cycles | of the motion that wears
+    energy_per_cycle | N mm | cycles | that joints dissipate under the force that wears
+    work_per_cycle | N mm | cycles | of the force that wears
+    damped_per_cycle | N mm | cycles | by the damping of the structure, in the same motion
+    stuck | Hz | cycles mode | natural frequencies with the contact stuck
+    resonance | Hz | cycles excitation | under each force
+    receptance | mm/N | cycles excitation | largest amplitude of the last mass over each force
+{WORN}/<state>/{CONTACT}
+    pressure | MPa | x y | at rest
+    gap | mm | x y | at rest
+    onset | mm | x y | motion of the joint from rest up to which each cell sticks
+    {_WORN.format(dims="x y")}
+    energy | N/mm | x y | per area, in such a cycle
+{WORN}/<state>/{SLIDERS}
+    reach | mm | slider | motion at which each slider gives way
+    stiffness | N/mm | slider | of its spring
+    normal_load | N | slider | that presses it
+    energy | N mm | slider | that it dissipates in a cycle under the force that wears
+{WORN}/<state>/{LOOP}
+    displacement | mm | point | of the joint or the mean of all, or between the targets, under the
+        force that wears
+    force | N | point | of the joint along it
+{WORN}/<state>/{HALF_SPACE}
+    displacement | mm | point | of the bodies, as far to and fro
+    force | N | point | between them, of the whole tangential problem
+{WORN}/<state>/{NODES}
+    gap | mm | node | of the worn bodies without load; below 0 what it closes
+    normal_force | N | node | of each node at rest
+    {_WORN.format(dims="node")}
+    energy | N mm | node | that each node dissipates in such a cycle
+""",
+    x="grid",
+    y="grid",
+)

@@ -40,16 +40,16 @@ ERRORS = {
 }
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
-    CurvesOf("worn depth", "evolution/cycles", "evolution/depth"),
-    CurvesOf("worn volume", "evolution/cycles", "evolution/volume"),
-    CurvesOf("tangential stiffness", "evolution/cycles", "evolution/stiffness"),
+    CurvesOf("worn depth", "evolution/depth"),
+    CurvesOf("worn volume", "evolution/volume"),
+    CurvesOf("tangential stiffness", "evolution/stiffness"),
     CurvesOf(
         "amplitude in the last state",
-        "worn/-1/responses/*/frequency",
         "worn/-1/responses/*/amplitude",
+        "frequency",
         logarithmic=True,
     ),
-    CurvesOf("loop in the last state", "worn/-1/loop/displacement", "worn/-1/loop/force"),
+    CurvesOf("loop in the last state", "worn/-1/loop/force", "displacement"),
 )
 
 

@@ -43,10 +43,8 @@ TO_JOULES, PER_MICRON, TO_MICRONS = 1e-3, 1e-3, 1e3
 
 def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
-    folder, reporter = run.folder, run.reporter
-    with reporter.stage("results"):
+    with run.reporter.stage("results"):
         _write_results(outcome, run)
-        _write_tables(outcome, folder)
     run.draw(_contents(outcome))
     finish(
         run,
@@ -69,19 +67,23 @@ def _contents(outcome: VibrationWearOutcome) -> VibrationWearContents:
 
 
 def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
-    case = outcome.case
+    """Write results, and as CSV evolution, nodes and responses of every state to every force."""
+    case, folder, layout = outcome.case, run.folder, layout_of(outcome.case.amount)
     attributes = {
         "analysis": case.analysis,
         "forces": list(case.amounts),
         "amount": case.amount.name,
     }
-    with run_results(run, case, layout_of(case.amount), attributes) as writer:
+    with run_results(run, case, layout, attributes) as writer:
         writer.put_contents(_contents(outcome))
         if outcome.grid is not None:
             writer.put_grid("grid", outcome.grid)
         if outcome.nodes is not None:
             writer.put(PLACES, {**outcome.nodes.arrays, **_named(outcome.nodes)})
-        writer.put(EVOLUTION, _evolution(outcome))
+        evolution = _evolution(outcome, layout)
+        writer.put(EVOLUTION, evolution)
+        path = folder.reserve(f"{EVOLUTION}.csv", "contact and resonances, over the cycles")
+        write_curves(path, evolution, layout.datasets(EVOLUTION))
         for number, state in enumerate(outcome.states):
             place = f"{WORN}/{number:05d}"
             writer.put(place, {}, **state.numbers)
@@ -90,9 +92,15 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
             for force, response in enumerate(state.responses):
                 where = f"{place}/{RESPONSES}/{force:05d}"
                 put_response_curves(writer, where, case.amount, response)
+                under = f"{case.amount.under(response.force)} after {state.cycles:g} cycles"
+                what = f"response {under}, over frequency"
+                path = folder.reserve(f"frf_{number:05d}_{force:05d}.csv", what)
+                write_curves(path, response.curves, layout.datasets(where))
+            if outcome.nodes is not None:
+                _write_nodes(outcome.nodes, number, state, folder, layout)
 
 
-def _evolution(outcome: VibrationWearOutcome) -> Arrays:
+def _evolution(outcome: VibrationWearOutcome, layout: Layout) -> Arrays:
     """Return numbers of all states against cycles ``(k,)``; those of each force ``(k, forces)``."""
     rows = [
         {
@@ -102,33 +110,13 @@ def _evolution(outcome: VibrationWearOutcome) -> Arrays:
         }
         for state in outcome.states
     ]
-    declared = layout_of(outcome.case.amount).datasets(EVOLUTION)
+    declared = layout.datasets(EVOLUTION)
     return {name: np.array([row[name] for row in rows]) for name in declared if name in rows[0]}
 
 
 def _named(nodes: WornNodes) -> Arrays:
     """Return the names of nodes, empty if they have none."""
     return {"name": np.array(nodes.names, dtype=np.bytes_)} if nodes.names else {}
-
-
-# --- tables -------------------------------------------------------------------------------------
-
-
-def _write_tables(outcome: VibrationWearOutcome, folder: OutputFolder) -> None:
-    """Write the evolution and the responses of every state to every force as CSV, in base units."""
-    under, what = outcome.case.amount.under, "contact and resonances, over the cycles"
-    layout = layout_of(outcome.case.amount)
-    path = folder.reserve(f"{EVOLUTION}.csv", what)
-    write_curves(path, _evolution(outcome), layout.datasets(EVOLUTION))
-    of_response = layout.datasets(f"{WORN}/-/{RESPONSES}/-")
-    for number, state in enumerate(outcome.states):
-        for force, response in enumerate(state.responses):
-            what = f"response {under(response.force)} after {state.cycles:g} cycles"
-            path = folder.reserve(f"frf_{number:05d}_{force:05d}.csv", f"{what}, over frequency")
-            write_curves(path, response.curves, of_response)
-    if outcome.nodes is not None:
-        for number, state in enumerate(outcome.states):
-            _write_nodes(outcome.nodes, number, state, folder, layout)
 
 
 def _write_nodes(

@@ -8,7 +8,7 @@ from wear.contact.drive import TILTS, Drive
 from wear.contact.face_loads import FaceLoads
 from workflow.analyses.contact.output.layout import load_columns
 from workflow.analyses.wear.output.layout import KINETICS, OTHER_FACE
-from workflow.layout.declared import Arrays
+from workflow.layout.declared import Arrays, declared
 from workflow.shell.output.results import ResultsWriter
 
 
@@ -53,4 +53,4 @@ def kinetics_columns(kinetics: Array, area: Array) -> dict[str, Array]:
 
     ``kinetics`` ``(n, 5)`` has depths and volumes of both bodies, and the energy.
     """
-    return dict(zip(KINETICS, (*kinetics.T, area), strict=True))
+    return dict(zip(declared(KINETICS), (*kinetics.T, area), strict=True))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from workflow.analyses.contact.output.layout import LOAD_HISTORY, TRACTIONS
-from workflow.analyses.wear.output.loop_table import COLUMNS
-from workflow.layout.declared import CELLS, GRID, Declarations, Declared, Layout, over
+from workflow.analyses.contact.output.layout import LOAD_HISTORY, ON_GRID, TRACTIONS
+from workflow.analyses.wear.output.loop_table import OVER_ENERGY
+from workflow.layout.declared import GRID, Layout
 
 MOMENTS = "unworn", "worn"
 # Ratio of the cycles to which kinetics are extrapolated to the computed cycles.
@@ -22,207 +22,100 @@ PRESSURES = {
 RESULTS = WORN | PRESSURES | {"life": "fretting parameter", "notch_stress": "notch stress"}
 # Group of the face of body 1, below that of the contact, which is the face of body 2.
 OTHER_FACE = "face_1"
-# Quantities of tangential loops that are written over the energy.
-OVER_ENERGY = "energy", "kt", "kt_error", "mu", "mu_error"
-_BULK = "what the structure carries past the contact included where the group says bulk_stress"
-
-
-def face_mesh(node: str = "node", facet: str = "facet") -> Declarations:
-    """Return nodes and facets of a face; in a line contact the facets are segments."""
-    facets = "corner nodes of the triangles, or of the segments of a line contact"
-    return {
-        **over(f"{node} component", coordinates=("mm", "nodes in the interface frame")),
-        **over(f"{facet} corner", facets=("1", facets)),
-    }
-
-
-FACE = {
-    **face_mesh(),
-    "slip": TRACTIONS["slip"]._replace(dims=("increment", "component", "node")),
-    "pressure": TRACTIONS["pressure"]._replace(dims=("increment", "node")),
-    "shear": TRACTIONS["shear"]._replace(dims=("increment", "component", "node")),
-    **over(
-        "increment axis node",
-        force=("N", "of body 1 on body 2 at the nodes, x, y and z"),
-        displacement=(
-            "mm",
-            "of body 2 relative to body 1 since both were unloaded and unworn, x, y and z",
-        ),
-    ),
-}
-CYCLES = over("cycles", cycles=("1", "cycles"))
-KINETICS = over(
-    "cycles",
-    depth_1=("mm", "largest worn depth of body 1"),
-    depth_2=("mm", "largest worn depth of body 2"),
-    volume_1=("mm^3", "worn volume of body 1"),
-    volume_2=("mm^3", "worn volume of body 2"),
-    energy=("N mm", "energy dissipated so far"),
-    area=("mm^2", "area in contact"),
-)
-_TENSION = "tension of the bolt in each increment, as far as it is meshed"
-_ENERGY = "energy dissipated in each increment"
-_FACES = {
-    "": FACE,
-    "/load_history": LOAD_HISTORY,
-    f"/{OTHER_FACE}": face_mesh("node_1", "facet_1"),
-}
-_ERROR = Declared(
-    "1",
-    f"estimated relative errors by {', '.join(PARTS)}, above 0 where too much is told, and "
-    "their total",
-    ("part",),
-)
-LAYOUT = Layout(
-    {
-        "grid/<face>": GRID,
-        **{f"structure/<face>{place}": face for place, face in _FACES.items()},
-        **{f"structure_worn/<face>{place}": face for place, face in _FACES.items()},
-        "surfaces/<face>/<jump>": over(
-            CELLS,
-            body_1=("mm", "height of body 1 in the interface frame"),
-            body_2=("mm", "height of body 2 in the interface frame"),
-        ),
-        "contact/<face>": {
-            **over(
-                "increment",
-                energy_half_space=("N mm", f"{_ENERGY}, half-space pressure"),
-                energy_nodes=("N mm", f"{_ENERGY}, nodal pressure"),
-            ),
-            **{
-                f"{name}_{when}": LOAD_HISTORY[name]._replace(
-                    description=f"{LOAD_HISTORY[name].description} that holds the tilt, {when}"
-                )
-                for name in ("Mx", "My")
-                for when in MOMENTS
-            },
-        },
-        "contact/<face>/coarse": {**GRID, "pressure": TRACTIONS["pressure"]},
-        "contact/<face>/<jump>": TRACTIONS,
-        "comparison/<face>/load_history": LOAD_HISTORY,
-        "comparison/<face>/<increment>": TRACTIONS,
-        "kinetics": CYCLES,
-        "kinetics/<face>": KINETICS,
-        "loops/<face>/<jump>": over(
-            "point",
-            displacement=(
-                "mm",
-                "of body 1 relative to body 2 along the axis, from the pressed state",
-            ),
-            force=("N", "tangential force on body 2"),
-        ),
-        "loops_over_energy/<face>": {
-            column.name: Declared(
-                column.units(per_length=False)[0].replace("*", " "),
-                column.description,
-                ("energy",),
-                line_unit=column.units(per_length=True)[0].replace("*", " "),
-            )
-            for column in COLUMNS
-            if column.name in OVER_ENERGY
-        },
-        "bolts/<bolt>": {
-            **over(
-                "cycles",
-                tension=(
-                    "N",
-                    "tension at peak load after each jump, as the loads were last solved",
-                ),
-            ),
-            **over(
-                "increment",
-                tension_unworn=("N", f"{_TENSION}, unworn"),
-                tension_worn=("N", f"{_TENSION}, worn"),
-            ),
-        },
-        "bodies/<body>/error": {"notch_stress": _ERROR},
-        "bodies/<body>/<moment>": {
-            **over("vertex axis", points=("mm", "vertices, the faces of body 2 in their form")),
-            **over(
-                "element corner",
-                elements=(
-                    "1",
-                    "corner vertices of the tetrahedra, or of the triangles in the plane",
-                ),
-            ),
-            **over("vertex axis", displacement=("mm", "displacement at peak load")),
-            **over(
-                "stress_component vertex",
-                stress=("MPa", "stress xx, yy, zz, xy, yz, zx of the global axes at peak load"),
-            ),
-            **over(
-                "vertex",
-                von_mises=("MPa", "von Mises stress at peak load"),
-                maximum_principal=("MPa", "largest principal stress at peak load"),
-            ),
-        },
-        "bodies/<body>/<moment>/mission": {
-            **over("increments", increments=("1", "increments, counted from 1")),
-            **over(
-                "surface_vertex axis",
-                points=("mm", "vertices of the surface of the body, or of all of it in the plane"),
-            ),
-            **over(
-                "triangle triangle_corner",
-                triangles=(
-                    "1",
-                    "triangles of the surface of the body, or of all of it in the plane",
-                ),
-            ),
-            **over(
-                "increments surface_vertex axis",
-                displacement=("mm", "displacement in each increment"),
-            ),
-            **over(
-                "increments surface_vertex",
-                von_mises=("MPa", "von Mises stress in each increment"),
-                maximum_principal=("MPa", "largest principal stress in each increment"),
-            ),
-        },
-        "stress/section/<face>": {
-            **over("along", along=("mm", "centres of the section's cells, along its axis")),
-            **over("depths", depths=("mm", "of the section's points below the surface")),
-        },
-        "stress/section/<face>/<moment>/<body>": {
-            **over(
-                "stress_component along depths",
-                stress=("MPa", f"xx, yy, zz, xy, yz, zx in the section at peak load, {_BULK}"),
-            ),
-            **over("along depths", von_mises=("MPa", "von Mises stress at peak load")),
-        },
-        "stress/life/<face>/<moment>": over(
-            "left_out_increment",
-            left_out=("1", "increments without full knowledge of the shear, not in the life map"),
-        ),
-        "stress/life/<face>/<moment>/<body>": {
-            **over(
-                CELLS,
-                friction_parameter=(
-                    "N/mm",
-                    "Ruiz's F1: a quarter of the friction work of a cycle per area",
-                ),
-                tension=("MPa", f"largest tension along the surface over a cycle, {_BULK}"),
-                cracking_parameter=("N^2/mm^3", "Ruiz's F2: F1 times tension"),
-                smith_watson_topper=(
-                    "MPa",
-                    "largest normal stress times strain amplitude, worst plane",
-                ),
-                strain_amplitude=("1", "amplitude of the normal strain on the worst plane"),
-                findley=("MPa", "shear stress amplitude plus k largest normal stress, worst plane"),
-                shear_amplitude=("MPa", "amplitude of the shear stress on the worst plane"),
-                normal_stress=(
-                    "MPa",
-                    f"largest normal stress over a cycle on the worst plane, {_BULK}",
-                ),
-            ),
-            **over(
-                f"axis {CELLS}",
-                normal=("1", "unit normal of the worst plane, in the interface frame"),
-            ),
-        },
-        "error/<face>": dict.fromkeys(RESULTS, _ERROR),
-    },
-    coordinates={**dict.fromkeys(GRID, "grid/<face>"), "cycles": "kinetics"},
+_BULK = "with what the structure carries past it where the group says bulk_stress"
+FACE_MESH = """
+    coordinates | mm | {node} component | nodes in the interface frame
+    facets | 1 | {facet} corner | corner nodes of triangles, or of segments of a line contact
+"""
+FACE = f"""{FACE_MESH.format(node="node", facet="facet")}
+    {TRACTIONS.format(cells="increment node", vectors="increment component node")}
+    force | N | increment axis node | of body 1 on body 2 at the nodes, x, y and z
+    displacement | mm | increment axis node | of body 2 relative to body 1 since both were unloaded
+        and unworn, x, y and z
+"""
+CYCLES = """
+    cycles | 1 | cycles | cycles
+"""
+KINETICS = """
+    depth_1, depth_2 | mm | cycles | largest worn depth of body #
+    volume_1, volume_2 | mm^3 | cycles | worn volume of body #
+    energy | N mm | cycles | energy dissipated so far
+    area | mm^2 | cycles | area in contact
+"""
+_ERROR = f"""1 | part | estimated relative errors by {", ".join(PARTS)},
+        above 0 where too much is told, and their total"""
+LAYOUT = Layout.read(
+    f"""
+grid/<face>{GRID}
+structure/<face>, structure_worn/<face>{FACE}
+structure/<face>/load_history, structure_worn/<face>/load_history{LOAD_HISTORY}
+structure/<face>/{OTHER_FACE}, structure_worn/<face>/{OTHER_FACE}
+    {FACE_MESH.format(node="node_1", facet="facet_1")}
+surfaces/<face>/<jump>
+    body_1, body_2 | mm | x y | height of body # in the interface frame
+contact/<face>
+    energy_half_space | N mm | increment | energy dissipated in each increment, half-space pressure
+    energy_nodes | N mm | increment | energy dissipated in each increment, nodal pressure
+    Mx_unworn, Mx_worn | N mm | increment | moment of the pressure about x that holds the tilt, #
+    My_unworn, My_worn | N mm | increment | moment of the pressure about y that holds the tilt, #
+contact/<face>/coarse{GRID}
+    pressure | MPa | x y | contact pressure
+contact/<face>/<jump>{ON_GRID}
+comparison/<face>/load_history{LOAD_HISTORY}
+comparison/<face>/<increment>{ON_GRID}
+kinetics{CYCLES}
+kinetics/<face>{KINETICS}
+loops/<face>/<jump>
+    displacement | mm | point | of body 1 relative to body 2 along the axis, from the pressed state
+    force | N | point | tangential force on body 2
+loops_over_energy/<face>
+    {OVER_ENERGY}
+bolts/<bolt>
+    tension | N | cycles | tension at peak load after each jump, as the loads were last solved
+    tension_unworn, tension_worn | N | increment | in each increment, as far as it is meshed, #
+bodies/<body>/error
+    notch_stress | {_ERROR}
+bodies/<body>/<moment>
+    points | mm | vertex axis | vertices, the faces of body 2 in their form
+    elements | 1 | element corner | corner vertices of tetrahedra, or of triangles in the plane
+    displacement | mm | vertex axis | displacement at peak load
+    stress | MPa | stress_component vertex | xx, yy, zz, xy, yz, zx of the global axes at peak load
+    von_mises | MPa | vertex | von Mises stress at peak load
+    maximum_principal | MPa | vertex | largest principal stress at peak load
+bodies/<body>/<moment>/mission
+    increments | 1 | increments | increments, counted from 1
+    points | mm | surface_vertex axis | vertices of the surface, or of the whole body in the plane
+    triangles | 1 | triangle triangle_corner | triangles of the surface, or of the body in the plane
+    displacement | mm | increments surface_vertex axis | displacement in each increment
+    von_mises | MPa | increments surface_vertex | von Mises stress in each increment
+    maximum_principal | MPa | increments surface_vertex | largest principal stress in each increment
+stress/section/<face>
+    along | mm | along | centres of the section's cells, along its axis
+    depths | mm | depths | of the section's points below the surface
+stress/section/<face>/<moment>/<body>
+    stress | MPa | stress_component along depths | xx, yy, zz, xy, yz, zx in the section at peak
+        load, {_BULK}
+    von_mises | MPa | along depths | von Mises stress at peak load
+stress/life/<face>/<moment>
+    left_out | 1 | left_out_increment | increments whose shear is not fully known, not in the map
+stress/life/<face>/<moment>/<body>
+    friction_parameter | N/mm | x y | Ruiz's F1: a quarter of the friction work of a cycle per area
+    tension | MPa | x y | largest tension along the surface over a cycle,
+        {_BULK}
+    cracking_parameter | N^2/mm^3 | x y | Ruiz's F2: F1 times tension
+    smith_watson_topper | MPa | x y | largest normal stress times strain amplitude, worst plane
+    strain_amplitude | 1 | x y | amplitude of the normal strain on the worst plane
+    findley | MPa | x y | shear stress amplitude plus k largest normal stress, worst plane
+    shear_amplitude | MPa | x y | amplitude of the shear stress on the worst plane
+    normal_stress | MPa | x y | largest normal stress over a cycle on the worst plane,
+        {_BULK}
+    normal | 1 | axis x y | unit normal of the worst plane, in the interface frame
+error/<face>
+    {", ".join(RESULTS)} | {_ERROR}
+""",
+    x="grid/<face>",
+    y="grid/<face>",
+    cycles="kinetics",
 )
 
 

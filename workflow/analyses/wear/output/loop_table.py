@@ -14,59 +14,41 @@ from workflow.case.files.input_files import InputFileError
 from workflow.case.files.table_file import TableFile, read_table_file
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
+from workflow.layout.declared import declared
 from workflow.shell.output.tables import heading, write_table
 
-
-@dataclass(frozen=True)
-class LoopColumn:
-    """Column of the table: ``unit`` is the base unit, ``shown`` the unit in the file.
-
-    ``extensive`` quantities are per mm in a line contact.
-    """
-
-    name: str
-    unit: str
-    shown: str
-    description: str
-    extensive: bool = True
-
-    def units(self, per_length: bool) -> tuple[str, str]:
-        """Return the base unit and the unit in the file."""
-        per = "/mm" if per_length and self.extensive else ""
-        return self.unit + per, self.shown + per
-
-    def written(
-        self, rows: Sequence[Mapping[str, float]], per_length: bool
-    ) -> tuple[str, list[float]]:
-        """Return heading and values of the column, in the unit of the file."""
-        base, unit = self.units(per_length)
-        factor = to_base(f"1 {unit}", base) if unit != base else 1.0
-        return heading(self.name, unit), [row[self.name] / factor for row in rows]
-
-
-COLUMNS = (
-    LoopColumn("cycles", "1", "1", "cycles", extensive=False),
-    LoopColumn("energy", "N*mm", "J", "energy that wear has dissipated so far"),
-    LoopColumn("P", "N", "N", "normal force"),
-    LoopColumn("kt", "N/mm", "N/mm", "tangential stiffness of the stuck contact"),
-    LoopColumn("mu", "1", "1", "largest tangential over normal force", extensive=False),
-    LoopColumn("energy_per_loop", "N*mm", "mJ", "energy dissipated in the loop"),
-    LoopColumn("area", "mm^2", "mm^2", "area in contact"),
-    LoopColumn("amplitude", "mm", "mm", "half the range of the displacement", extensive=False),
-    LoopColumn("force", "N", "N", "half the range of the tangential force"),
-    LoopColumn(
-        "sliding", "1", "1", "share of P on cells that slip as branches end", extensive=False
-    ),
-    LoopColumn("residual_stiffness", "N/mm", "N/mm", "slope of the loop as branches end"),
-    LoopColumn(
-        "border_load", "1", "1", "share of P on the grid's outermost cells", extensive=False
-    ),
-    LoopColumn("kt_error", "N/mm", "N/mm", "estimated error of kt due to the grid"),
-    LoopColumn("mu_error", "1", "1", "of mu, due to grid and increments", extensive=False),
-    LoopColumn(
-        "energy_per_loop_error", "N*mm", "mJ", "of energy_per_loop, due to grid and increments"
-    ),
-)
+OVER_ENERGY = """
+    energy | N mm | energy | energy that wear has dissipated so far
+    kt | N/mm | energy | tangential stiffness of the stuck contact | N/mm/mm
+    mu | 1 | energy | largest tangential over normal force
+    kt_error | N/mm | energy | estimated error of kt due to the grid | N/mm/mm
+    mu_error | 1 | energy | estimated error of mu due to grid and increments
+"""
+"""Quantities of loops that the results have over the energy."""
+_QUANTITIES = declared(f"""{OVER_ENERGY}
+    cycles | 1 | energy | cycles
+    P | N | energy | normal force
+    energy_per_loop | N mm | energy | energy dissipated in the loop
+    area | mm^2 | energy | area in contact
+    amplitude | mm | energy | half the range of the displacement
+    force | N | energy | half the range of the tangential force
+    sliding | 1 | energy | share of P on cells that slip as branches end
+    residual_stiffness | N/mm | energy | slope of the loop as branches end | N/mm/mm
+    border_load | 1 | energy | share of P on the grid's outermost cells
+    energy_per_loop_error | N mm | energy | estimated error of energy_per_loop due to grid and
+        increments
+""")
+# Columns of the table, in their order.
+COLUMNS = {
+    name: _QUANTITIES[name]
+    for name in (
+        *("cycles", "energy", "P", "kt", "mu", "energy_per_loop", "area", "amplitude", "force"),
+        *("sliding", "residual_stiffness", "border_load"),
+        *("kt_error", "mu_error", "energy_per_loop_error"),
+    )
+}
+# Units of energies in the table.
+SHOWN = {"energy": "J", "energy_per_loop": "mJ", "energy_per_loop_error": "mJ"}
 # Share of P that must slip for mu to be the coefficient of friction, not just what is mobilised.
 SLIDES = 1.0 - 1e-6
 # Significant digits, since joint laws read the table again.
@@ -95,8 +77,13 @@ def write_loop_table(
     path: Path, rows: Sequence[Mapping[str, float]], per_length: bool = False
 ) -> None:
     """Write a table of loops; all ``rows`` are in base units and have the same columns."""
-    columns = [column for column in COLUMNS if column.name in rows[0]]
-    write_table(path, dict(column.written(rows, per_length) for column in columns), DIGITS)
+    columns = {}
+    for name in filter(rows[0].__contains__, COLUMNS):
+        base = COLUMNS[name].unit_in(per_length)
+        unit = base.replace("N mm", SHOWN.get(name, ""))
+        factor = to_base(f"1 {unit}", base) if unit != base else 1.0
+        columns[heading(name, unit)] = [row[name] / factor for row in rows]
+    write_table(path, columns, DIGITS)
 
 
 def read_loop_table(path: Path) -> LoopTable:
@@ -109,7 +96,7 @@ def read_loop_table(path: Path) -> LoopTable:
         table = read_table_file(path)
         table.require(NEEDED, f"at least {', '.join(NEEDED)}")
         per_length = _per_length(table)
-        units = {column.name: column.units(per_length)[0] for column in COLUMNS}
+        units = {name: column.unit_in(per_length) for name, column in COLUMNS.items()}
         # Unknown columns may be misspelt optional ones.
         table.check(units)
         columns = {name: table.column(name, Quantity(units[name])) for name in table.names}
@@ -126,9 +113,9 @@ def read_loop_table(path: Path) -> LoopTable:
 
 def _per_length(table: TableFile) -> bool:
     """Return whether the table is of a line contact, by the unit of its stiffness."""
-    (kt,) = (column for column in COLUMNS if column.name == "kt")
+    kt = COLUMNS["kt"]
     try:
-        to_base(f"1 {table.unit('kt') or kt.unit}", kt.units(True)[0])
+        to_base(f"1 {table.unit('kt') or kt.unit}", kt.unit_in(line=True))
     except UnitError:
         return False
     return True

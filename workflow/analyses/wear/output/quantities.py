@@ -32,15 +32,15 @@ PARAMETERS = {
 }
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
-    CurvesOf("depth worn from body 1", "kinetics/cycles", "kinetics/*/depth_1"),
-    CurvesOf("depth worn from body 2", "kinetics/cycles", "kinetics/*/depth_2"),
-    CurvesOf("volume worn from body 1", "kinetics/cycles", "kinetics/*/volume_1"),
-    CurvesOf("volume worn from body 2", "kinetics/cycles", "kinetics/*/volume_2"),
-    CurvesOf("pressure across the middle, unworn", "grid/*", "contact/*/00000/pressure"),
-    CurvesOf("pressure across the middle, worn", "grid/*", "contact/*/-1/pressure"),
-    CurvesOf("tangential loop, worn", "loops/*/-1/displacement", "loops/*/-1/force"),
-    CurvesOf("kt of tangential loops", "loops_over_energy/*/energy", "loops_over_energy/*/kt"),
-    CurvesOf("mu of tangential loops", "loops_over_energy/*/energy", "loops_over_energy/*/mu"),
+    CurvesOf("depth worn from body 1", "kinetics/*/depth_1"),
+    CurvesOf("depth worn from body 2", "kinetics/*/depth_2"),
+    CurvesOf("volume worn from body 1", "kinetics/*/volume_1"),
+    CurvesOf("volume worn from body 2", "kinetics/*/volume_2"),
+    CurvesOf("pressure across the middle, unworn", "contact/*/00000/pressure"),
+    CurvesOf("pressure across the middle, worn", "contact/*/-1/pressure"),
+    CurvesOf("tangential loop, worn", "loops/*/-1/force", "displacement"),
+    CurvesOf("kt of tangential loops", "loops_over_energy/*/kt"),
+    CurvesOf("mu of tangential loops", "loops_over_energy/*/mu"),
 )
 
 

@@ -36,6 +36,7 @@ from workflow.analyses.wear.output.outcome import STOPPED, InterfaceOutcome, Out
 from workflow.analyses.wear.stress.body_stress import StressedCycle, with_known_shear
 from workflow.analyses.wear.stress.contact_stress import InterfaceStress, contact_stresses
 from workflow.analyses.wear.worn.contact_loops import (
+    Measurements,
     loops_sentence,
     warn_of_border,
     write_loop_tables,
@@ -49,6 +50,7 @@ from workflow.analyses.wear.worn.worn_structure import (
     worn_structure,
 )
 from workflow.case.text.plain import shares
+from workflow.layout.declared import Arrays
 from workflow.models.structure import StructureLoads
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
@@ -57,8 +59,6 @@ from workflow.shell.output.results import ResultsWriter, run_results
 from workflow.shell.output.summary import finish
 from workflow.shell.terminal.reporter import Reporter
 
-# Fields of each interface in the file of a jump.
-JUMP_FIELDS = {"surfaces": ("body_1", "body_2"), "contact": ("pressure", "shear", "slip")}
 # Attributes of the kinetics for each linear regime; nan if there is none.
 REGIME_ATTRIBUTES = {"linear_from": "start", "rate": "rate", "trend": "trend", "scatter": "scatter"}
 
@@ -104,10 +104,10 @@ def write_output(outcome: Outcome, probe_results: ProbeResults, run: Run[WearCas
         stresses = _stresses(outcome, structure, reporter, told)
     budget = error_budget(outcome, reporter, probe_results)
     with reporter.stage("results"):
-        recorded, contents = _write_results(outcome, structure, stresses, budget, run)
+        recorded, contents, measured = _write_results(outcome, structure, stresses, budget, run)
     run.draw(contents)
     worn_nodes = write_worn_faces(source, stages, state.interfaces, folder, reporter)
-    loops = write_loop_tables(folder, source.line)
+    loops = write_loop_tables(folder, measured, source.line)
     warn_of_border(loops, case.loops, reporter)
     drift = float(state.drift.max(initial=0.0))
     warn_of_errors(case, outcome.interfaces, budget, drift, reporter)
@@ -157,8 +157,8 @@ def _write_results(
     stresses: list[InterfaceStress],
     budget: Budget,
     run: Run[WearCase],
-) -> tuple[dict[str, PeakHistory], WearContents]:
-    """Write ``results.h5``; return the recorded peak histories by interface, and its contents."""
+) -> tuple[dict[str, PeakHistory], WearContents, Measurements]:
+    """Write ``results.h5``; return peak histories by interface, its contents, and loops."""
     case, source = outcome.case, outcome.source
     attributes = {
         "friction": case.friction.at(0.0),
@@ -181,12 +181,12 @@ def _write_results(
             writer.put(f"contact/{stage.name}", energy | _holding_moments(contact))
             if first.cycle:
                 write_comparison(writer, stage.name, first.cycle, loads, source.peak)
-        recorded = _write_jumps(writer, outcome, run.folder)
+        recorded, kept = _write_jumps(writer, outcome, run.folder)
         _write_kinetics(writer, outcome, recorded)
-        write_loops(writer, run.folder, outcome.state.jump)
+        loops = write_loops(writer, kept)
         if structure is not None:
             structure.write(writer, case.accuracy)
-            structure.bolts.write(writer, run.folder, outcome.state.jump)
+            structure.bolts.write(writer, kept)
         for stress in stresses:
             stress.write(writer)
         for name, errors in budget.items():
@@ -212,7 +212,7 @@ def _write_results(
             worn=any(found.kinetics[-1, :2].max() > NOTHING for found in outcome.interfaces),
         )
         writer.put_contents(contents)
-    return recorded, contents
+    return recorded, contents, loops
 
 
 def _holding_moments(contact: InterfaceOutcome) -> dict[str, Array]:
@@ -246,25 +246,27 @@ def _write_coarse(writer: ResultsWriter, contact: InterfaceOutcome, peak: int) -
 
 def _write_jumps(
     writer: ResultsWriter, outcome: Outcome, folder: OutputFolder
-) -> dict[str, PeakHistory]:
-    """Copy surfaces and contacts of all jumps; return the peak histories by interface."""
+) -> tuple[dict[str, PeakHistory], list[Arrays]]:
+    """Copy surfaces and contacts of all jumps.
+
+    Returns the peak histories by interface, and of each jump the cycles and what else is kept.
+    """
     recorded = {contact.stage.name: PeakHistory([], [], []) for contact in outcome.interfaces}
     grids = [contact.stage.grid for contact in outcome.interfaces]
+    kept: list[Arrays] = []
     for jump in range(outcome.state.jump + 1):
         arrays, attributes = read_arrays(folder.jump(jump))
-        cycles = attributes["cycles"]
         for (name, peaks), grid in zip(recorded.items(), grids, strict=True):
-            surfaces, tractions = (
-                {field: arrays[f"{kind}/{name}/{field}"] for field in fields}
-                for kind, fields in JUMP_FIELDS.items()
-            )
-            place, pressure = f"{name}/{jump:05d}", tractions["pressure"]
-            writer.put(f"surfaces/{place}", surfaces, cycles=cycles)
-            writer.put(f"contact/{place}", tractions, cycles=cycles)
+            pressure = arrays[f"contact/{name}/pressure"]
+            for group in (f"surfaces/{name}/", f"contact/{name}/"):
+                places = [place for place in arrays if place.startswith(group)]
+                fields = {place.removeprefix(group): arrays.pop(place) for place in places}
+                writer.put(f"{group}{jump:05d}", fields, cycles=attributes["cycles"])
             peaks.area.append(np.count_nonzero(pressure > 0.0) * grid.cell_area)
             peaks.width.append(_extent(pressure) * grid.pitch[0])
             peaks.pressure.append(float(pressure.max()))
-    return recorded
+        kept.append({**arrays, **attributes})
+    return recorded, kept
 
 
 def _extent(pressure: Array) -> int:

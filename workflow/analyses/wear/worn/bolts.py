@@ -10,10 +10,9 @@ import numpy as np
 from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
 from wear.coupled import CoupledState
+from workflow.layout.declared import Arrays
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
-from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.folders.store import read_arrays
 from workflow.shell.output.results import ResultsWriter
 
 # Group of the results, and dataset in the file of a jump.
@@ -42,17 +41,17 @@ class BoltTensions:
     def names(self) -> tuple[str, ...]:
         return tuple(bolt.name for bolt in self._stage.bolts)
 
-    def write(self, writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None:
-        """Write tensions over both cycles, and at peak load after every jump.
+    def write(self, writer: ResultsWriter, jumps: Sequence[Arrays]) -> None:
+        """Write tensions over both cycles, and those kept with every jump at peak load.
 
-        Tensions after a jump are those of the last solved loads; the last one is that of the worn
+        Tensions of a jump are those of the last solved loads; the last one is that of the worn
         cycle.
         """
         if not self.names:
             return
         peak = self._stage.peak
-        kept = [read_arrays(folder.jump(jump))[0][TENSION] for jump in range(jumps)]
-        kept.append(self.moments["worn"])  # on the last surfaces, whatever the coupling
+        # The last ones are on the last surfaces, whatever the coupling.
+        kept = [*(arrays[TENSION] for arrays in jumps[:-1]), self.moments["worn"]]
         for number, name in enumerate(self.names):
             cycles = {
                 f"tension_{moment}": tensions[number] for moment, tensions in self.moments.items()

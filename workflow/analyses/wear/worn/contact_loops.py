@@ -8,26 +8,30 @@ and, one row per loop, to ``loops_<interface>.csv``
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import h5py
 import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.wear.case.loops import Loops
-from workflow.analyses.wear.output.layout import OVER_ENERGY
-from workflow.analyses.wear.output.loop_table import COLUMNS, SLIDES, write_loop_table
+from workflow.analyses.wear.output.loop_table import COLUMNS, OVER_ENERGY, SLIDES, write_loop_table
 from workflow.case.text.readable import percent
+from workflow.layout.declared import Arrays, declared
 from workflow.models.loops import WornLoop
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import ResultsWriter
 from workflow.shell.terminal.reporter import Reporter
 
 # Quantities that every loop measures; the cycles are those of the jump.
-MEASURED = tuple(column.name for column in COLUMNS if column.name != "cycles")
+MEASURED = tuple(name for name in COLUMNS if name != "cycles")
 # Groups of a file above those of interfaces and jumps.
 LOOPS, LOOPS_OVER_ENERGY = "loops", "loops_over_energy"
+# The cycles of a jump, among the arrays of its file.
+CYCLES = "cycles"
+
+Measurements = Mapping[str, Sequence[Mapping[str, float]]]
+"""Values that the loops of each interface measure, by loop."""
 
 
 def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:
@@ -43,41 +47,37 @@ def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Arr
 # --- writing ------------------------------------------------------------------------------------
 
 
-def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None:
-    """Copy the loops of all jumps, 0 to ``jumps``, into the results: /loops/<interface>/<jump>.
+def write_loops(writer: ResultsWriter, jumps: Sequence[Arrays]) -> Measurements:
+    """Write the loops kept with each jump to /loops/<interface>/<jump>; return what they measure.
 
     The measured values are also written against energy: /loops_over_energy/<interface>.
     """
-    measured: dict[str, list[list[float]]] = {}
-    for jump in range(jumps + 1):
-        with h5py.File(folder.jump(jump), "r") as file:
-            cycles = float(file.attrs["cycles"])
-            for name, kept in file.get(LOOPS, {}).items():
-                _write_loop(writer, f"{LOOPS}/{name}/{jump:05d}", kept, cycles)
-                measured.setdefault(name, []).append(kept["values"][()].tolist())
+    measured: dict[str, list[dict[str, float]]] = {}
+    for jump, arrays in enumerate(jumps):
+        for name in [place.split("/")[1] for place in arrays if place.endswith("/values")]:
+            place = f"{LOOPS}/{name}"
+            values = dict(zip(MEASURED, arrays[f"{place}/values"].tolist(), strict=True))
+            values["cycles"] = float(arrays[CYCLES])
+            curve = {of: arrays[f"{place}/{of}"] for of in ("displacement", "force")}
+            writer.put(f"{place}/{jump:05d}", curve, **values)
+            measured.setdefault(name, []).append(values)
     for name, rows in measured.items():
-        columns = dict(zip(MEASURED, np.array(rows).T, strict=True))
-        writer.put(
-            f"{LOOPS_OVER_ENERGY}/{name}", {column: columns[column] for column in OVER_ENERGY}
-        )
+        over_energy = {of: np.array([row[of] for row in rows]) for of in declared(OVER_ENERGY)}
+        writer.put(f"{LOOPS_OVER_ENERGY}/{name}", over_energy)
+    return measured
 
 
-def _write_loop(writer: ResultsWriter, place: str, kept: h5py.Group, cycles: float) -> None:
-    curve = {name: kept[name][()] for name in ("displacement", "force")}
-    values = dict(zip(MEASURED, kept["values"][()].tolist(), strict=True))
-    writer.put(place, curve, **values, cycles=cycles)
-
-
-def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[str, Any]]:
+def write_loop_tables(
+    folder: OutputFolder, measured: Measurements, per_length: bool
+) -> dict[str, dict[str, Any]]:
     """Write the table of every interface; return the summary's loop entries by interface."""
     summary: dict[str, dict[str, Any]] = {}
-    with h5py.File(folder.results, "r") as file:
-        for name, group in file.get(LOOPS, {}).items():
-            rows = [{c.name: float(loop.attrs[c.name]) for c in COLUMNS} for loop in group.values()]
-            table = f"loops_{name}.csv"
-            path = folder.reserve(table, f"tangential loops of {name} as it wears")
-            write_loop_table(path, rows, per_length)
-            summary[name] = {"file": table, "unworn": rows[0], "worn": rows[-1]}
+    for name, values in measured.items():
+        rows = [{column: row[column] for column in COLUMNS} for row in values]
+        table = f"loops_{name}.csv"
+        path = folder.reserve(table, f"tangential loops of {name} as it wears")
+        write_loop_table(path, rows, per_length)
+        summary[name] = {"file": table, "unworn": rows[0], "worn": rows[-1]}
     return summary
 
 

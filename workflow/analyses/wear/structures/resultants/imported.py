@@ -9,7 +9,8 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import Face
 from sa_solver.types import Array, Frame, Indices, LoadHistory, Tilt
-from workflow.analyses.contact.output.layout import loads_over
+from workflow.analyses.contact.output.layout import LOADS
+from workflow.layout.declared import declared
 
 COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
 MOMENTS = ("Mx", "My")
@@ -65,8 +66,8 @@ class ImportedLoads:
 
 def base_units(line: bool) -> dict[str, str]:
     """Return the base unit of every column; per length in a line contact."""
-    declared = loads_over("increment")
-    return {name: of.unit_in(line) for name, of in declared.items() if name != "sliding"}
+    columns = declared(LOADS).items()
+    return {name: column.unit_in(line) for name, column in columns if name != "sliding"}
 
 
 def required_columns(line: bool, given: Collection[str]) -> list[str]:

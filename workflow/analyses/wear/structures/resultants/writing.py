@@ -17,24 +17,18 @@ from workflow.analyses.wear.output.datasets import mesh_of
 from workflow.analyses.wear.output.layout import FACE
 from workflow.analyses.wear.structures.resultants.consistency import MIX
 from workflow.analyses.wear.structures.resultants.imported import CLOSURE, base_units
-from workflow.layout.declared import CELLS, Arrays, Layout, over
+from workflow.layout.declared import Arrays, Layout
 from workflow.shell.output.results import ResultsWriter, writing
 from workflow.shell.output.tables import heading, write_table
 
-LAYOUT = Layout(
-    {
-        "<face>": {
-            **FACE,
-            **over(CELLS, height=("mm", "gap before loading")),
-            **over(
-                "node",
-                nodes_1=("1", "node numbers of body 1"),
-                nodes_2=("1", "node numbers of body 2"),
-                nodal_height=("mm", "gap before loading, at the nodes"),
-            ),
-        },
-        "<face>/load_history": LOAD_HISTORY,
-    }
+LAYOUT = Layout.read(
+    f"""
+<face>{FACE}
+    height | mm | x y | gap before loading
+    nodes_1, nodes_2 | 1 | node | node numbers of body #
+    nodal_height | mm | node | gap before loading, at the nodes
+<face>/load_history{LOAD_HISTORY}
+"""
 )
 NOTE = "forces and moments of body 1 on body 2, in the frame of each interface"
 
