@@ -50,7 +50,7 @@ def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
     worst = max(errors, key=lambda name: errors[name].total)
     error = errors[worst]
     parts = [
-        f"{name} {'+' * (name in error.signed and part > 0.0)}{percent(part)}"
+        f"{name} {'+' if name in error.signed and part > 0.0 else ''}{percent(part)}"
         for name, part in error.largest[:MOST_PARTS]
         if part and abs(part) >= WORTH_REPORTING * error.total
     ]
