@@ -94,7 +94,7 @@ def friction(cells: int, pair: ElasticPair = ALIKE) -> Sized:
     contact = FrictionalContact(half_space, FRICTION)
 
     def run() -> int:
-        state, count = contact.apart(height), 0
+        state, count = contact.unloaded_state(height), 0
         for share in (0.0, SHEAR_SHARE):
             load = np.array([1.0, share * FRICTION, 0, 0, 0, 0]) * hertz.load
             state = contact.advance(state, height, ContactLoad(load))
@@ -208,7 +208,7 @@ def _rig(elements: int) -> HarmonicBalance:
 
 
 def _response(problem: HarmonicBalance, odd: int) -> int:
-    refined = problem.refined(Resolution((0, *range(1, 2 * odd, 2)), 256))
+    refined = problem.with_resolution(Resolution((0, *range(1, 2 * odd, 2)), 256))
     branch = along_frequency(refined, FORCE, SPAN, control=STEPS)
     assert branch.message == "", branch.message
     return len(branch.solutions)

@@ -117,14 +117,14 @@ def history() -> Ladder:
 
     Errors are those of the shear at the ends of the legs, summed over the cells, relative to µP.
     """
-    grid = Grid.strips(1.2, 256)
+    grid = Grid.line_contact(1.2, 256)
     half_space = HalfSpace(grid, ElasticPair(Material(np.inf, 0.3), Material(115e3, 0.29)))
     contact, height = FrictionalContact(half_space, friction=0.5), grid.x**2 / 100.0
     corners = np.zeros((4, 6))
     corners[1:, 0], corners[2:, 1] = 400.0, (100.0, -100.0)
 
     def in_increments(count: int) -> Array:
-        state, ends = contact.apart(height), []
+        state, ends = contact.unloaded_state(height), []
         for before, after in pairwise(corners):
             for share in np.arange(1, count + 1) / count:
                 load = ContactLoad((1.0 - share) * before + share * after)

@@ -11,9 +11,9 @@ import scipy.sparse as sp
 
 from fe_models.cyclic.cuts import Cuts, Cyclic, hold_normal
 from fe_models.cyclic.sector import (
-    check_alike,
     check_jumps,
     check_off_cuts,
+    check_same_in_all_sectors,
     check_temperatures,
     sector_cuts,
 )
@@ -192,7 +192,7 @@ def imported_structure(
         check_off_cuts(mesh.bodies, support.group, cyclic)
     for load in loads:
         check_load(imported, mesh.bodies, load)
-        check_alike(mesh.bodies, load, cyclic)
+        check_same_in_all_sectors(mesh.bodies, load, cyclic)
         check_temperatures(mesh, imported.node_numbers, load, cuts)
     bodies = [
         _supported(number, mesh, imported, material, supports, loads, order, cuts[number])

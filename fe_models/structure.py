@@ -18,7 +18,7 @@ from fe_models.meshes.structure_mesh import Face, Interface, StructureMesh, in_s
 from fe_models.solvers.pardiso import sharing
 from fe_models.supported_body import SupportedBody
 from sa_solver.cycles.increments import dissipated, in_rows, mean_of_ends
-from sa_solver.transforms.threads import at_once
+from sa_solver.transforms.threads import run_parallel
 from sa_solver.types import Array, Indices, LoadHistory, Progress, Tally, resultants, unseen
 
 T = TypeVar("T")
@@ -197,7 +197,7 @@ class Structure:
             every = sp.identity(len(held_2), format="csr") if projection is None else projection
             projection = every[~held_2][:, ~held_1]
         done = self._steps(progress)
-        condensed = self.at_once(*(partial(body.condense, done, keep) for body in self.bodies))
+        condensed = self.run_parallel(*(partial(body.condense, done, keep) for body in self.bodies))
         among_free = np.cumsum(~np.concatenate(self.held)) - 1
         pairs = zip(self.bodies, self.places, strict=True)
         places = [among_free[place[~body.held]] for body, place in pairs]
@@ -220,22 +220,22 @@ class Structure:
             if on_1 is None or on_1 != body_2.on_interface(mirrors[1]):
                 continue
             done = self._steps(progress)
-            halves = self.at_once(
+            halves = self.run_parallel(
                 partial(body_1.halves, mirrors[0], on_1, done, keep),
                 partial(body_2.halves, mirrors[1], on_1, done, keep),
             )
             if halves[0] is not None and halves[1] is not None:
-                condensed = self.at_once(*halves[0], *halves[1])
+                condensed = self.run_parallel(*halves[0], *halves[1])
                 joint = join_halves(condensed[:2], condensed[2:], on_1)
                 done()
                 return joint
         return None
 
-    def at_once(self, *jobs: Callable[[], T]) -> list[T]:
+    def run_parallel(self, *jobs: Callable[[], T]) -> list[T]:
         """Run jobs that each factorise a body, in parallel if memory surely suffices."""
         if sum(body.elastic.size for body in self.bodies) > MOST_AT_ONCE:
             return [job() for job in jobs]
-        return at_once(sharing(jobs))
+        return run_parallel(sharing(jobs))
 
     @property
     def projection(self) -> sp.csr_matrix | None:

@@ -48,10 +48,10 @@ class FrictionalContact:
 
     >>> import numpy as np
     >>> from sa_solver import ContactLoad, ElasticPair, FrictionalContact, Grid, HalfSpace, Material
-    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.strips(1.0, 128)
+    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.line_contact(1.0, 128)
     >>> contact = FrictionalContact(HalfSpace(grid, ElasticPair(steel, steel)), friction=0.5)
     >>> height = grid.x**2 / 100.0
-    >>> state = contact.apart(height)
+    >>> state = contact.unloaded_state(height)
     >>> for Qx in (0.0, 60.0, 0.0):
     ...     state = contact.advance(state, height, ContactLoad(np.array([200.0, Qx, 0, 0, 0, 0])))
     ...     stuck, lost = 0.5 * state.sticking.sum() * grid.pitch[0], state.energy[0]
@@ -80,7 +80,7 @@ class FrictionalContact:
         self.friction, self.tolerance, self._sliding = friction, tolerance, sliding
         self._modes = PlanarModes.on(self.grid)
 
-    def apart(self, height: Array, along: Array | None = None) -> ContactState:
+    def unloaded_state(self, height: Array, along: Array | None = None) -> ContactState:
         """Return the state of the unloaded bodies, with the gap ``height`` ``(nx, ny)`` [mm].
 
         Their surfaces may have moved ``along`` each other: see :class:`ContactLoad`.

@@ -63,7 +63,7 @@ class ContactLoad:
     >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.covering((1.0, 1.0), (32, 32))
     >>> contact = FrictionalContact(HalfSpace(grid, ElasticPair(steel, steel)), friction=0.5)
     >>> height = (grid.x**2 + grid.y**2) / 20.0
-    >>> state = contact.advance(contact.apart(height), height, ContactLoad(P=500.0))
+    >>> state = contact.advance(contact.unloaded_state(height), height, ContactLoad(P=500.0))
     >>> state = contact.advance(state, height, ContactLoad(P=500.0, shift_x=0.002))
     >>> print(f"Qx {state.resultants[1]:.0f} N")
     Qx 111 N

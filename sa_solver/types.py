@@ -236,7 +236,7 @@ class Grid:
     >>> grid = Grid.covering((1.0, 0.5), (4, 2))
     >>> print(grid.pitch, grid.cell_area, grid.x.ravel())
     (0.25, 0.25) 0.0625 [-0.375 -0.125  0.125  0.375]
-    >>> print(Grid.strips(1.0, 4))
+    >>> print(Grid.line_contact(1.0, 4))
     Grid(shape=(4, 1), pitch=(0.25, 1.0), line=True)
     """
 
@@ -251,10 +251,10 @@ class Grid:
             raise InputError(f"a grid of {shape} cells of {pitch} mm has no area: give more than 0")
         checks.settle(self, shape=shape, pitch=pitch)
         if self.line and (self.shape[1] != 1 or self.pitch[1] != 1.0):
-            raise InputError("a line grid has one row of cells 1 mm long: use Grid.strips")
+            raise InputError("a line grid has one row of cells 1 mm long: use Grid.line_contact")
 
     @classmethod
-    def strips(cls, width: float, count: int) -> Grid:
+    def line_contact(cls, width: float, count: int) -> Grid:
         """Return the grid of a line contact: ``count`` cells that together cover ``width`` [mm]."""
         width = checks.number("the width of a grid [mm]", width)
         return cls((count, 1), (width / max(count, 1), 1.0), line=True)
@@ -271,7 +271,7 @@ class Grid:
 
         A line contact uses the first of ``size`` and of ``shape`` only.
         """
-        return cls.strips(size[0], shape[0]) if line else cls.covering(size, shape)
+        return cls.line_contact(size[0], shape[0]) if line else cls.covering(size, shape)
 
     @property
     def cell_area(self) -> float:

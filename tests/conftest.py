@@ -54,5 +54,5 @@ def dovetail_text(dovetail_path: Path) -> str:
 @pytest.fixture
 def reads_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Read mesh and CAD files in the process of the test, which is faster."""
-    name = "fe_models.geometry.imported.read_apart"
+    name = "fe_models.geometry.imported.read_in_subprocess"
     monkeypatch.setattr(name, lambda read, *arguments: read(*arguments))

@@ -311,7 +311,7 @@ def compare_run(
     lines += [f"additional: {key}" for key in outermost(added)]
     if after[f"{name} > exit code"] != "0":
         lines.append(f"failed on the later side, as its {name}/output.txt says")
-    largest, told = (0.0, ""), []
+    largest, reported = (0.0, ""), []
     for key in before.keys() & after.keys():
         difference = deviation(key, before[key], after[key])
         if isinstance(difference, str):
@@ -321,10 +321,10 @@ def compare_run(
         if difference > tolerance:
             lines.append(f"deviates by {difference:.1e}: {key}")
         elif every and difference:
-            told.append(f"deviates by {difference:.1e}, rounding: {key}")
+            reported.append(f"deviates by {difference:.1e}, rounding: {key}")
     ending = f"largest deviation {largest[0]:.1e}" + (f" in {largest[1]}" if largest[0] else "")
     print(f"{name}: {len(after)} fields {'DIFFER' if lines else 'agree'}, {ending}")
-    for line in (*sorted(lines), *sorted(told)):
+    for line in (*sorted(lines), *sorted(reported)):
         print(f"  {line}")
     return not lines
 

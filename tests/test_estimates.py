@@ -79,9 +79,9 @@ def test_ladders_of_grids_say_how_far_hertz_is(room):
         pressure = NormalContact(HalfSpace(grid, pair)).solve(height, 100.0).pressure
         half = count // 2
         found.append(float(pressure[half - 1 : half + 1, half - 1 : half + 1].mean()))
-    told = richardson(found, [1.0 / count for count in counts], 2.0).error
+    reported = richardson(found, [1.0 / count for count in counts], 2.0).error
     true = abs(found[-1] - hertz.peak_pressure)
-    assert true / 3.0 < told < 3.0 * true
+    assert true / 3.0 < reported < 3.0 * true
 
 
 # --- specimens ------------------------------------------------------------------------------------
@@ -96,11 +96,11 @@ def test_the_coupled_cycle_says_what_the_uncoupled_one_leaves(curved):
     gap = face.gap if curved else np.zeros(len(face))
     given = FrettingConditions(250.0, STROKE, FRICTION)
     uncoupled = pair.fretting_cycle(gap, given).energy
-    told, true = (
+    reported, true = (
         uncoupled / float(pair.coupled_cycle(gap, given, count).energy.sum()) - 1.0
         for count in (QUARTER, 6 * QUARTER)
     )
-    assert told == pytest.approx(true, rel=0.3)
+    assert reported == pytest.approx(true, rel=0.3)
 
 
 # --- rigs that age --------------------------------------------------------------------------------
@@ -115,7 +115,7 @@ def test_steady_states_of_an_ageing_rig_are_as_many_as_it_takes(tmp_path):
         run(tmp_path, RIG + stiffer, *loud, f"ageing={{energy: 100 J, tolerance: {tolerance}}}")
         for tolerance in (3e-2, 3e-5)
     )
-    told = few["ageing"]["relative_error"]
+    reported = few["ageing"]["relative_error"]
     assert few["ageing"]["steady_states"] < many["ageing"]["steady_states"]
     true = abs(few["cycles"] / many["cycles"] - 1.0)
-    assert true / 3.0 < told < 3.0 * true
+    assert true / 3.0 < reported < 3.0 * true

@@ -39,7 +39,7 @@ Contacts at nodes are in :mod:`wear.contact.nodes`, joints of vibrating structur
 >>> import numpy as np
 >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
 >>> from wear import *
->>> grid, steel = Grid.strips(1.4, 70), Material(210e3, 0.3)
+>>> grid, steel = Grid.line_contact(1.4, 70), Material(210e3, 0.3)
 >>> contact = InterfaceSettings(
 ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
 ...     pair=ElasticPair(steel, steel), laws=(EnergyLaw(5e-9), EnergyLaw(5e-9)),

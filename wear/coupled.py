@@ -28,7 +28,7 @@ from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
 from wear.load_sources import CycleSource
 from wear.steps.steppers import ROUNDING
-from wear.worn import Spent, WornState
+from wear.worn import Cost, WornState
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -47,7 +47,7 @@ RESPONSE = 0.5
 on the default two-dimensional dovetail they change by 3 % where 7 % of the load moves.
 """
 
-NOTHING = Spent()
+NOTHING = Cost()
 """Cost of what is known already."""
 
 Stage = Literal["contact, first cycle", "wear", "drift probe", "structural friction"]
@@ -277,7 +277,7 @@ class CoupledState(Generic[Worn]):
         Probed resultants at the last solution of the load source ``(interfaces, 6)``.
     solutions
         Number of solutions of the load source.
-    spent
+    cost
         Cost of all contact solutions.
     """
 
@@ -287,7 +287,7 @@ class CoupledState(Generic[Worn]):
     drift: Array
     solved_resultants: Array
     solutions: int
-    spent: Spent
+    cost: Cost
 
     @property
     def jump(self) -> int:
@@ -329,10 +329,10 @@ class Observer:
     def begin(self, state: CoupledState[Any]) -> None:
         """Handle the start of the run from a state, which is unworn or that of an earlier run."""
 
-    def jumping(self, state: CoupledState[Any], cycles: float) -> None:
+    def jump_started(self, state: CoupledState[Any], cycles: float) -> None:
         """Handle the start of a jump of ``cycles``, which may be shortened near a stop."""
 
-    def jumped(self, before: CoupledState[Any], after: CoupledState[Any]) -> None:
+    def jump_finished(self, before: CoupledState[Any], after: CoupledState[Any]) -> None:
         """Handle the end of a jump, after the loads have been updated."""
 
     def remaining(self, state: CoupledState[Any], jumps: int) -> None:
@@ -368,9 +368,10 @@ class CoupledWear(Generic[Worn]):
     >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
     >>> from wear import *
     >>> class PrintJumps(Observer):
-    ...     def jumped(self, before, after):
+    ...     def jump_finished(self, before, after):
     ...         print(f"{after.cycles[-1]:.0f} cycles, {1e3 * after.depth:.3f} um")
-    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> grid, steel, law = Grid.line_contact(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4,
+    ...     3000.0)
     >>> contact = InterfaceContact(InterfaceSettings(
     ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
     ...     pair=ElasticPair(steel, steel), laws=(law, law),
@@ -404,10 +405,10 @@ class CoupledWear(Generic[Worn]):
         assert isinstance(self.settings, CoupledSettings)
         with self._stage("contact, first cycle"):
             begun = self._faces.begin(unworn, self.settings.cycles)
-        spent = sum((first.spent for _, first in begun), Spent())
-        return self.unworn([state for state, _ in begun], spent), [first for _, first in begun]
+        cost = sum((first.cost for _, first in begun), Cost())
+        return self.unworn([state for state, _ in begun], cost), [first for _, first in begun]
 
-    def unworn(self, interfaces: Sequence[Worn], spent: Spent = NOTHING) -> CoupledState[Worn]:
+    def unworn(self, interfaces: Sequence[Worn], cost: Cost = NOTHING) -> CoupledState[Worn]:
         """Return the state before the first jump, from those of the contacts and their cost."""
         state = CoupledState(
             interfaces=tuple(interfaces),
@@ -416,7 +417,7 @@ class CoupledWear(Generic[Worn]):
             drift=np.empty(0),
             solved_resultants=self._probe(interfaces),
             solutions=1,
-            spent=spent,
+            cost=cost,
         )
         return state.record(0.0, self.contacts, 0.0)
 
@@ -437,7 +438,7 @@ class CoupledWear(Generic[Worn]):
             observer.begin(state)
         return steps.march("jump", state, self._advance)
 
-    def jumps_left(self, state: CoupledState[Worn]) -> int:
+    def remaining_jumps(self, state: CoupledState[Worn]) -> int:
         """Return an estimate of the number of jumps that are left.
 
         All jumps are taken to be as long as the next one, or to go on growing as they have over the
@@ -469,19 +470,19 @@ class CoupledWear(Generic[Worn]):
         if self.settings.ended(state):
             return None
         if self.observers and state.jump:
-            jumps = self.jumps_left(state)
+            jumps = self.remaining_jumps(state)
             for observer in self.observers:
                 observer.remaining(state, jumps)
         after = self._jump(state)
         for observer in self.observers:
-            observer.jumped(state, after)
+            observer.jump_finished(state, after)
         return after
 
     def _jump(self, state: CoupledState[Worn]) -> CoupledState[Worn]:
-        settings, spent = self.settings, Spent()
+        settings, cost = self.settings, Cost()
         cycles = settings.next_jump(state)
         for observer in self.observers:
-            observer.jumping(state, cycles)
+            observer.jump_started(state, cycles)
         # Steppers treat the last cycles of a run differently, and a stop may end it earlier.
         left = max(cycles, settings.left(state))
         begun: Sequence[Worn] = state.interfaces
@@ -489,14 +490,14 @@ class CoupledWear(Generic[Worn]):
             with self._stage("wear"):
                 if settings.automatic:
                     begun = _in_phase(state.interfaces, cycles)
-                jumped = self.contacts.jump(begun, cycles, left)
-            spent = sum((further for _, further in jumped), spent)
-            interfaces = tuple(worn for worn, _ in jumped)
+                jump_finished = self.contacts.jump(begun, cycles, left)
+            cost = sum((further for _, further in jump_finished), cost)
+            interfaces = tuple(worn for worn, _ in jump_finished)
             shorter = cycles * settings.share_to_stop(state, self.contacts.kinetics(interfaces))
             if shorter == cycles or cycles <= 1.0:
                 break
             cycles = left = max(1.0, shorter)
-        state = replace(state, interfaces=interfaces, spent=state.spent + spent)
+        state = replace(state, interfaces=interfaces, cost=state.cost + cost)
         state, drift = self._follow_drift(state)
         return state.record(float(state.cycles[-1]) + cycles, self.contacts, drift)
 
@@ -528,7 +529,7 @@ class CoupledWear(Generic[Worn]):
             interfaces=tuple(interface for interface, _ in followed),
             solved_resultants=probe,
             solutions=state.solutions + 1,
-            spent=sum((further for _, further in followed), state.spent),
+            cost=sum((further for _, further in followed), state.cost),
         ), drift
 
     def _probe(self, interfaces: Sequence[Any]) -> Array:

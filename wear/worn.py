@@ -13,18 +13,18 @@ from wear.surfaces import Surfaces
 
 
 @dataclass(frozen=True)
-class Spent:
+class Cost:
     """Cost of a computation: solved contact increments, convolutions and wear steps."""
 
     contact_solves: int = 0
     convolutions: int = 0
     steps: int = 0
 
-    def __add__(self, other: Spent) -> Spent:
-        return Spent(*map(add, astuple(self), astuple(other)))
+    def __add__(self, other: Cost) -> Cost:
+        return Cost(*map(add, astuple(self), astuple(other)))
 
-    def __sub__(self, other: Spent) -> Spent:
-        return Spent(*map(sub, astuple(self), astuple(other)))
+    def __sub__(self, other: Cost) -> Cost:
+        return Cost(*map(sub, astuple(self), astuple(other)))
 
 
 @dataclass(frozen=True)
@@ -75,14 +75,14 @@ class WornState:
         return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, np.inf, **further)
 
     @property
-    def companion(self) -> Self:
+    def coarse_run(self) -> Self:
         """State from which the coarse companion takes its next step."""
         return self if self.coarse is None else self.coarse
 
     @property
     def half_way(self) -> bool:
         """True if the coarse companion has done only the first half of its step."""
-        return self.companion.coarse is not None
+        return self.coarse_run.coarse is not None
 
     @property
     def errors(self) -> tuple[Array, Array]:
@@ -90,7 +90,7 @@ class WornState:
 
         For steps of order p the estimate is the difference to the coarse companion over 2^p - 1.
         """
-        fine, coarse, share = self.surfaces, self.companion.surfaces, 1.0 / (2.0**self.order - 1.0)
+        fine, coarse, share = self.surfaces, self.coarse_run.surfaces, 1.0 / (2.0**self.order - 1.0)
         error_1, error_2 = (
             share * (longer - shorter)
             for longer, shorter in zip(coarse.depths, fine.depths, strict=True)
@@ -107,4 +107,4 @@ class WearStep(Generic[State]):
 
     state: State
     cycles: float
-    spent: Spent
+    cost: Cost

@@ -215,10 +215,10 @@ def chart(
             accuracy=accuracy_of(accuracy),
             loudness=_loudness(loudness),
         )
-        told = write_chart(charted, out)
+        reported = write_chart(charted, out)
     if loudness != "QUIET":
         show(charted)
-        for line in look_at(out, told):
+        for line in look_at(out, reported):
             click.echo(line)
     return errors.DONE if charted.complete else errors.MethodFailed.exit_code
 
@@ -253,9 +253,9 @@ def sweep(
         raise errors.UserError("--processes is for this machine; allowed: it or --dask")
     from workflow.sweep import run_sweep
 
-    told = _loudness(loudness)
+    reported = _loudness(loudness)
     with _repeatable(out):
-        done = run_sweep(file, out, processes=processes, dask=dask, force=force, loudness=told)
+        done = run_sweep(file, out, processes=processes, dask=dask, force=force, loudness=reported)
     return errors.DONE if done else errors.MethodFailed.exit_code
 
 
@@ -270,7 +270,7 @@ def check(case: str, overrides: tuple[str, ...], out: Path | None, force: bool) 
     Says what is given in plain units, what looks like a slip, and whether the memory is enough.
     With --out the contact faces of a meshed structure are drawn: where they are, and how far apart.
     """
-    from workflow.case.doubts import doubts_of
+    from workflow.case.plausibility import plausibility_warnings_of
     from workflow.case.text.leaves import taken
     from workflow.kinds import analysis_of, load_case
     from workflow.shell.output.measured import check_measured
@@ -284,8 +284,8 @@ def check(case: str, overrides: tuple[str, ...], out: Path | None, force: bool) 
     needed = ("memory", f"up to {memory.required / 1e9:.1f} GB"), ("time", run_time.text)
     for name, text in [*loaded.outline(), *taken(loaded), *needed]:
         click.echo(_fitted(f"  {name:<10} {text}", indent=13))
-    for doubt in doubts_of(loaded):
-        click.echo(_fitted(f"warning: {doubt}", indent=2))
+    for warning in plausibility_warnings_of(loaded):
+        click.echo(_fitted(f"warning: {warning}", indent=2))
     if out is not None:
         if analysis.draw_faces is None:
             raise errors.UserError(f"{case}: has no faces to draw; allowed with --out: a wear case")
@@ -367,7 +367,7 @@ def describe(
 
     imported = read_file(file, size, unit)
     # Contents that are not in the case are listed when the case is written.
-    for line in describe_bodies(imported if case is None else replace(imported, left=())):
+    for line in describe_bodies(imported if case is None else replace(imported, unused=())):
         click.echo(line)
     if out is not None:
         for path in write_assembly(imported, out, file.name, force):
@@ -458,15 +458,15 @@ for _command in (loops, scar, fit):
 
 def main() -> None:
     """Run the command line; this is the entry point of the command."""
-    from workflow.shell.terminal.signals import end_tidily, hear_no_more
-    from workflow.shell.terminal.streams import hold_standard_streams, spell_what_streams_lack
+    from workflow.shell.terminal.signals import end_tidily, ignore_signals
+    from workflow.shell.terminal.streams import hold_standard_streams, replace_missing_characters
 
     hold_standard_streams()
-    spell_what_streams_lack()
+    replace_missing_characters()
     end_tidily()
     try:
         cli(prog_name="fretscale")
     except KeyboardInterrupt:  # pressed again while the first interruption was being reported
         sys.exit(errors.INTERRUPTED)
     finally:
-        hear_no_more()
+        ignore_signals()

@@ -79,9 +79,9 @@ def exit_code(error: FretscaleError) -> int:
     return UserError.exit_code if isinstance(error, InputError) else MethodFailed.exit_code
 
 
-def one_line(said: object) -> str:
+def one_line(printed: object) -> str:
     """Return a text in one line, with single spaces for line breaks and runs of spaces."""
-    return " ".join(str(said).split())
+    return " ".join(str(printed).split())
 
 
 class ModelWarning(UserWarning):

@@ -103,8 +103,8 @@ def leaf(path: str, field: FieldInfo) -> str:
         default(field),
         example(field),
     ]
-    told = " ".join(note for note in notes if note)
-    return f"`{path}`\n: {sentence(field.description)}\n\n  {told}"
+    reported = " ".join(note for note in notes if note)
+    return f"`{path}`\n: {sentence(field.description)}\n\n  {reported}"
 
 
 def allowed(field: FieldInfo) -> str:

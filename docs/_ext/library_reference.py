@@ -292,9 +292,9 @@ def as_it_stands(
         held[name] = list(lines)
 
 
-def put_back(held: dict[str, list[str]], *told: Any) -> None:
-    """Restore the docstring of a property; ``told`` are the arguments of the Sphinx event."""
-    _, _, name, _, _, lines = told
+def put_back(held: dict[str, list[str]], *reported: Any) -> None:
+    """Restore the docstring of a property; ``reported`` are the arguments of the Sphinx event."""
+    _, _, name, _, _, lines = reported
     if name in held:
         lines[:] = held.pop(name)
 

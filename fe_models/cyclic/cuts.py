@@ -114,7 +114,7 @@ class Cuts:
         Number of sectors.
     matched
         Whether the meshes of the cuts are images of each other.
-    apart
+    max_distance
         Largest distance of one cut from the image of the other [mm].
 
     Examples
@@ -129,7 +129,7 @@ class Cuts:
     >>> cuts = {"one": lambda x: x[1] == 0.0, "other": lambda x: x[0] == 0.0}
     >>> quarter = Body("quarter", mesh.with_boundaries(cuts))
     >>> found = Cuts.of(quarter, Cyclic(["one"], ["other"], np.eye(3)[1], np.zeros(3), 4))
-    >>> print(found.matched, found.apart)
+    >>> print(found.matched, found.max_distance)
     True 0.0
     """
 
@@ -139,7 +139,7 @@ class Cuts:
     through: Array
     count: int
     matched: bool
-    apart: float
+    max_distance: float
 
     @classmethod
     def of(cls, body: Body, cyclic: Cyclic) -> Cuts:
@@ -171,7 +171,7 @@ class Cuts:
         reach = IMAGE * float(cyclic.radii(body.points).max())
         apart = sector._between_meshes(body)
         if apart <= reach:
-            return replace(sector, matched=True, apart=apart)
+            return replace(sector, matched=True, max_distance=apart)
         flat = _plane_of(body, high)
         if np.abs(flat.coordinates(_corners(body, high))[..., 2]).max() > reach:
             raise MeshError(
@@ -186,7 +186,7 @@ class Cuts:
                 f"{_mismatch(cyclic)}: it is up to {level:.3g} mm off; the centres of both are "
                 f"{angle:.6g}° apart, as for {360.0 / max(angle, 1e-9):.4g} sectors"
             )
-        return replace(sector, apart=level)
+        return replace(sector, max_distance=level)
 
     def of_turn(self, body: Body) -> Array:
         """Return the rotation of a body's displacements ``(d, d)``."""
@@ -286,7 +286,7 @@ class Cuts:
         other = vectors[high] - np.einsum("ab,nb...->na...", turn, vectors[of_high])
         return float(max(np.abs(one).max(), np.abs(other).max()))
 
-    def unlike(self, body: Body, values: Array) -> float:
+    def relative_difference(self, body: Body, values: Array) -> float:
         """Return the relative difference of ``values`` ``(vertices,)`` of both cuts.
 
         Where meshes do not match, the variation within a facet is subtracted.

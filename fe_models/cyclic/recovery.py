@@ -123,7 +123,7 @@ class _Beyond:
         parts = {0: _elements_at(mesh.t, _reached(near, self.own))}
         parts |= _of_next_sectors(mesh.t, near, (low, high), self._first.count)
         size = float(np.linalg.norm(np.ptp(elastic.nodes, axis=0)))
-        self._same = SAME * size + len(parts) * max(pair.apart for pair in cuts)
+        self._same = SAME * size + len(parts) * max(pair.max_distance for pair in cuts)
         body = self._meshed(parts, free)
         wide = ElasticBody(body, elastic.material, elastic.order)
         self.recovery = StressRecovery(wide, body.mesh.boundaries["free"])

@@ -84,7 +84,7 @@ def check_temperatures(
         if not pairs or load.body not in (None, body.name):
             continue
         changes = load.at(numbers[body.name])
-        unlike = max(pair.unlike(body, changes) for pair in pairs)
+        unlike = max(pair.relative_difference(body, changes) for pair in pairs)
         if unlike > UNLIKE:
             raise MeshError(
                 f"temperatures of body {body.name} differ between both cuts by {unlike:.2g} of the "
@@ -108,7 +108,9 @@ def check_jumps(body: Body, jumps: Array, cuts: Sequence[Cuts]) -> None:
         )
 
 
-def check_alike(bodies: Sequence[Body], load: AppliedLoad, cyclic: Sequence[Cyclic]) -> None:
+def check_same_in_all_sectors(
+    bodies: Sequence[Body], load: AppliedLoad, cyclic: Sequence[Cyclic]
+) -> None:
     """Raise :class:`MeshError` if a load cannot be the same in all sectors, or is on a cut."""
     if not cyclic:
         return

@@ -24,7 +24,7 @@ class Start:
         initial displacement.
     time
         Initial time [s].
-    companion
+    coarse_run
         Initial state of the companion run, which integrates the same motion with steps of twice the
         length. If None, it starts from this state.
     """
@@ -33,7 +33,7 @@ class Start:
     velocity: Array | None = None
     joint_state: Array | None = None
     time: float = 0.0
-    companion: Start | None = None
+    coarse_run: Start | None = None
 
     def motion(self, size: int) -> Array:
         """Return displacements, then velocities, as one vector ``(2 n,)``.
@@ -97,7 +97,7 @@ class Motion:
         Displacements [mm] and resisting forces [N] of the joints, ``(t, j, d)``.
     joint_state
         State ``(j, k)`` of the joints at the last time.
-    companion
+    coarse_run
         State of the companion run at the last time, or None; see :class:`Start`.
     energies
         Energies at all times.
@@ -119,7 +119,7 @@ class Motion:
     joint_displacement: Array
     joint_force: Array
     joint_state: Array
-    companion: Start | None
+    coarse_run: Start | None
     energies: Energies
     error: float
     residual: float
@@ -138,7 +138,7 @@ class Motion:
             self.velocity[-1],
             self.joint_state,
             float(self.times[-1]),
-            self.companion,
+            self.coarse_run,
         )
 
 

@@ -23,7 +23,7 @@ from fe_models.readers.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, 
 from fe_models.readers.length_unit import SIZES, LengthUnit
 from fe_models.readers.meshio_file import read_meshio
 from fe_models.readers.nastran.mesh import read_nastran
-from fe_models.readers.reader_process import read_apart, reading
+from fe_models.readers.reader_process import read_in_subprocess, reading
 from fe_models.readers.scene import Scene
 from fe_models.readers.set_faces import faces_of_sets
 from fe_models.readers.text_files import open_text
@@ -57,7 +57,7 @@ class ImportedMesh:
         Points in the middle of edges, for bodies for which the file has them.
     middles
         Edges ``(k, 2)`` whose midside nodes are in each of the node sets.
-    left
+    unused
         Lines of the file that describe more than a mesh and are not imported.
     scene
         Materials, contacts, supports and loads of the file.
@@ -94,7 +94,7 @@ class ImportedMesh:
     points: dict[str, dict[str, Indices]]
     midsides: dict[str, Midsides] = field(default_factory=dict)
     middles: dict[str, dict[str, Indices]] = field(default_factory=dict)
-    left: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
     scene: Scene = field(default_factory=Scene)
     axes: tuple[int, ...] = (0, 1, 2)
     unit: LengthUnit = field(default_factory=LengthUnit)
@@ -199,11 +199,11 @@ def _grouped(path: Path, size: float | None, unit: str | None) -> GroupedMesh:
                 f"{path}: a CAD file needs a mesh size, as it is meshed here: --size '2 mm' of "
                 "fretscale describe, mesh.size of a case"
             )
-        return read_apart(read_cad, path, size, unit and given)
+        return read_in_subprocess(read_cad, path, size, unit and given)
     if size is not None:
         raise MeshError(f"{path}: is a mesh already; a mesh size is for {', '.join(CAD)} only")
     if suffix == ".msh":
-        mesh = read_apart(read_msh, path)
+        mesh = read_in_subprocess(read_msh, path)
     else:
         mesh = _READERS.get(suffix, read_meshio)(path)
     return (mesh if unit is None else replace(mesh, unit=given)).in_millimetres()
@@ -276,7 +276,7 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
             lines.append(
                 f"  node set {points}: {len(vertices)} nodes{form}, centroid {vector(centre)} mm"
             )
-    return lines + [f"not taken over: {line}" for line in imported.left]
+    return lines + [f"not taken over: {line}" for line in imported.unused]
 
 
 def extent(points: Array) -> str:
@@ -341,7 +341,7 @@ def _separated(grouped: GroupedMesh) -> ImportedMesh:
         points=points,
         midsides=midsides,
         middles=middles,
-        left=grouped.left,
+        unused=grouped.unused,
         scene=grouped.scene,
         axes=tuple(axes.tolist()),
         unit=grouped.unit,

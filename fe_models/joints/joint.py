@@ -34,7 +34,7 @@ from fe_models.joints.condensation import Condensed
 from fe_models.solvers.blas_threads import one_thread
 from fe_models.solvers.symmetry import Matrix, Mirror, SplitMatrix, symmetric_product
 from sa_solver import checks
-from sa_solver.transforms.threads import at_once
+from sa_solver.transforms.threads import run_parallel
 from sa_solver.types import Array, Indices
 
 T = TypeVar("T")
@@ -229,7 +229,7 @@ def _in_single_threads(jobs: Sequence[Callable[[], T]]) -> list[T]:
     This is as fast as running them one by one with all threads.
     """
     with one_thread():
-        return at_once(jobs)
+        return run_parallel(jobs)
 
 
 def _product(matrix: Matrix | SplitMatrix, vectors: Array) -> Array:

@@ -1,6 +1,7 @@
 r"""Matrices of structures from other programs, and reduced models for other programs.
 
-- ``own_matrices``, ``OwnMatrices``: stiffness, mass, damping and loads from files, in base units
+- ``external_matrices``, ``ExternalMatrices``: stiffness, mass, damping and loads from files, in
+base units
 - ``Unknown``, ``GivenUnknowns``, ``FileUnits``: meaning and units of their rows
 - ``read_matrix_file``, ``MatrixFile``: content of a single file
 - ``on_retained``, ``on_all``: reduced model of the matrices, on some points or on all
@@ -14,14 +15,14 @@ A mass of 2 kg on 1 N/µm in two files of Matrix Market, in m and N:
 
 >>> import tempfile
 >>> from pathlib import Path
->>> from fe_models.matrices import FileUnits, GivenUnknowns, Unknown, own_matrices
+>>> from fe_models.matrices import FileUnits, GivenUnknowns, Unknown, external_matrices
 >>> folder = Path(tempfile.mkdtemp())
 >>> for name, value in (("k", "1e6"), ("m", "2")):
 ...     text = f"%%MatrixMarket matrix array real general\n1 1\n{value}\n"
 ...     _ = (folder / f"{name}.mtx").write_text(text)
 >>> sources = {"stiffness": (folder / "k.mtx", ""), "mass": (folder / "m.mtx", "")}
 >>> given = GivenUnknowns((Unknown("mass", "x"),))
->>> own = own_matrices(sources, given=given, units=FileUnits(length=1000.0))
+>>> own = external_matrices(sources, given=given, units=FileUnits(length=1000.0))
 >>> print(own.stiffness.toarray(), own.mass.toarray())
 [[1000.]] [[0.002]]
 """
@@ -41,21 +42,26 @@ if TYPE_CHECKING:
         with_light_motions,
         without_massless,
     )
-    from fe_models.matrices.structure import FileUnits, GivenUnknowns, OwnMatrices, own_matrices
+    from fe_models.matrices.structure import (
+        ExternalMatrices,
+        FileUnits,
+        GivenUnknowns,
+        external_matrices,
+    )
     from fe_models.matrices.unknowns import MatrixError, MatrixFile, Unknown
 
 __all__ = [
+    "ExternalMatrices",
     "FileUnits",
     "GivenUnknowns",
     "MatrixError",
     "MatrixFile",
-    "OwnMatrices",
     "Unknown",
     "check_definite",
+    "external_matrices",
     "lowest_frequencies",
     "on_all",
     "on_retained",
-    "own_matrices",
     "read_matrix_file",
     "with_light_motions",
     "without_massless",
@@ -75,7 +81,7 @@ __getattr__, __dir__ = lazy_names(
             "with_light_motions",
             "without_massless",
         ),
-        "structure": ("FileUnits", "GivenUnknowns", "OwnMatrices", "own_matrices"),
+        "structure": ("FileUnits", "GivenUnknowns", "ExternalMatrices", "external_matrices"),
         "unknowns": ("MatrixError", "MatrixFile", "Unknown"),
     },
 )

@@ -1,4 +1,4 @@
-"""Reduced models in the formats of other programs, which :func:`own_matrices` can read."""
+"""Reduced models in the formats of other programs, which :func:`external_matrices` can read."""
 
 from __future__ import annotations
 
@@ -36,13 +36,14 @@ def write_matrices(model: ReducedModel, folder: Path, stem: str, formats: tuple[
     >>> from pathlib import Path
     >>> import numpy as np
     >>> import scipy.sparse as sp
-    >>> from fe_models.matrices import OwnMatrices, Unknown, on_all, own_matrices, write_matrices
+    >>> from fe_models.matrices import ExternalMatrices, Unknown, external_matrices
+    >>> from fe_models.matrices import on_all, write_matrices
     >>> unknowns = Unknown("tip", "x"), Unknown("mode 1", "modal")
     >>> K, M = sp.diags([1e3, 4e6]).tocsr(), sp.diags([1e-3, 1.0]).tocsr()
-    >>> model = on_all(OwnMatrices(K, M, None, np.zeros((2, 0)), unknowns))
+    >>> model = on_all(ExternalMatrices(K, M, None, np.zeros((2, 0)), unknowns))
     >>> folder = Path(tempfile.mkdtemp())
     >>> write_matrices(model, folder, "body", ("npz",))
-    >>> back = own_matrices({}, folder / "body.npz")
+    >>> back = external_matrices({}, folder / "body.npz")
     >>> print(back.unknowns[1].name, bool((back.stiffness != K).nnz))
     mode 1 modal False
     """

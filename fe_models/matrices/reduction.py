@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg as sl
 
 from fe_models.joints.reduction import ReducedModel, free_frequencies, reduce_body
-from fe_models.matrices.structure import OwnMatrices
+from fe_models.matrices.structure import ExternalMatrices
 from fe_models.matrices.unknowns import MODAL, ROTATIONS, MatrixError, Unknown
 from fe_models.solvers.linear_solver import FactorMemoryError, SolverError
 from sa_solver import checks
@@ -32,7 +32,7 @@ DENSE = 600
 MOST_LISTED = 12
 
 
-def on_all(matrices: OwnMatrices) -> ReducedModel:
+def on_all(matrices: ExternalMatrices) -> ReducedModel:
     """Return the matrices unchanged as a dense model, with coordinates of modes after all others.
 
     Examples
@@ -41,10 +41,10 @@ def on_all(matrices: OwnMatrices) -> ReducedModel:
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
-    >>> from fe_models.matrices import OwnMatrices, Unknown, on_all
+    >>> from fe_models.matrices import ExternalMatrices, Unknown, on_all
     >>> unknowns = Unknown("mode 1", "modal"), Unknown("tip", "x")
     >>> K, M = sp.diags([4e6, 1e3]).tocsr(), sp.diags([1.0, 1e-3]).tocsr()
-    >>> model = on_all(OwnMatrices(K, M, None, np.zeros((2, 0)), unknowns))
+    >>> model = on_all(ExternalMatrices(K, M, None, np.zeros((2, 0)), unknowns))
     >>> print(model.names, model.frequencies.round(1), model.static_stiffness)
     ('tip x',) [318.3] [[1000.]]
     """
@@ -71,7 +71,7 @@ def on_all(matrices: OwnMatrices) -> ReducedModel:
 
 
 def on_retained(
-    matrices: OwnMatrices,
+    matrices: ExternalMatrices,
     points: Sequence[str],
     modes: int,
     done: Callable[[], None] = lambda: None,
@@ -89,11 +89,11 @@ def on_retained(
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
-    >>> from fe_models.matrices import OwnMatrices, Unknown, on_retained
+    >>> from fe_models.matrices import ExternalMatrices, Unknown, on_retained
     >>> K = 1e3 * sp.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(11, 11)).tolil()
     >>> K[0, 0] = K[10, 10] = 1e3
     >>> names = tuple(Unknown(str(k), "x") for k in range(11))
-    >>> row = OwnMatrices(K.tocsr(), 1e-3 * sp.identity(11, format="csr"), None,
+    >>> row = ExternalMatrices(K.tocsr(), 1e-3 * sp.identity(11, format="csr"), None,
     ...                   np.zeros((11, 0)), names)
     >>> model = on_retained(row, ["0", "10"], modes=1)
     >>> print(model.names, model.static_stiffness.round(6)[0], model.frequencies.round(3))
@@ -165,10 +165,10 @@ def without_massless(
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
-    >>> from fe_models.matrices import OwnMatrices, Unknown, on_all, without_massless
+    >>> from fe_models.matrices import ExternalMatrices, Unknown, on_all, without_massless
     >>> K = sp.csr_matrix([[2000.0, -1000.0], [-1000.0, 1000.0]])
     >>> names = Unknown("between", "x"), Unknown("end", "x")
-    >>> pair = OwnMatrices(K, sp.diags([0.0, 1e-3]).tocsr(), None, np.zeros((2, 0)), names)
+    >>> pair = ExternalMatrices(K, sp.diags([0.0, 1e-3]).tocsr(), None, np.zeros((2, 0)), names)
     >>> model, dropped = without_massless(on_all(pair))
     >>> print(model.stiffness, model.names, dropped)
     [[500.]] ('end x',) ('between x',)
@@ -256,11 +256,11 @@ def with_light_motions(
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
-    >>> from fe_models.matrices import OwnMatrices, Unknown, on_all, with_light_motions
+    >>> from fe_models.matrices import ExternalMatrices, Unknown, on_all, with_light_motions
     >>> K = sp.csr_matrix([[2000.0, -1000.0], [-1000.0, 2000.0]])
     >>> M = sp.csr_matrix([[0.25e-3, 0.25e-3], [0.25e-3, 0.25e-3]])
     >>> names = Unknown("a", "x"), Unknown("b", "x")
-    >>> own = OwnMatrices(K, M, None, np.zeros((2, 0)), names)
+    >>> own = ExternalMatrices(K, M, None, np.zeros((2, 0)), names)
     >>> model, light = with_light_motions(on_all(own), frequency=1e4)
     >>> print(light, np.linalg.eigvalsh(model.mass).round(9))
     ('a x',) [7.6e-07 5.0e-04]
@@ -310,10 +310,10 @@ def check_definite(model: ReducedModel, laden: Mapping[str, float] = NOTHING) ->
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
-    >>> from fe_models.matrices import OwnMatrices, Unknown, check_definite, on_all
+    >>> from fe_models.matrices import ExternalMatrices, Unknown, check_definite, on_all
     >>> K = 1e3 * sp.csr_matrix([[1.0, -1.0], [-1.0, 1.0]])
     >>> names = Unknown("a", "x"), Unknown("b", "x")
-    >>> check_definite(on_all(OwnMatrices(K, sp.identity(2), None, np.zeros((2, 0)), names)))
+    >>> check_definite(on_all(ExternalMatrices(K, sp.identity(2), None, np.zeros((2, 0)), names)))
     1
     """
     require_names(model)
@@ -340,7 +340,7 @@ def check_definite(model: ReducedModel, laden: Mapping[str, float] = NOTHING) ->
     return int((values < NEGATIVE).sum())
 
 
-def lowest_frequencies(matrices: OwnMatrices, count: int) -> Array:
+def lowest_frequencies(matrices: ExternalMatrices, count: int) -> Array:
     """Return the lowest natural frequencies [Hz]: 0 for rigid motions, and up to ``count`` above.
 
     Raises :class:`MatrixError` for motions without mass or stiffness, and
@@ -353,10 +353,10 @@ def lowest_frequencies(matrices: OwnMatrices, count: int) -> Array:
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
-    >>> from fe_models.matrices import OwnMatrices, Unknown, lowest_frequencies
+    >>> from fe_models.matrices import ExternalMatrices, Unknown, lowest_frequencies
     >>> K = 1e3 * sp.csr_matrix([[1.0, -1.0], [-1.0, 1.0]])
     >>> names = Unknown("a", "x"), Unknown("b", "x")
-    >>> pair = OwnMatrices(K, 1e-3 * sp.identity(2).tocsr(), None, np.zeros((2, 0)), names)
+    >>> pair = ExternalMatrices(K, 1e-3 * sp.identity(2).tocsr(), None, np.zeros((2, 0)), names)
     >>> print((2.0 * np.pi * lowest_frequencies(pair, 3)).round(2))
     [   0.   1414.21]
     """

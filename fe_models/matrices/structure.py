@@ -66,7 +66,7 @@ class FileUnits:
 
 
 @dataclass(frozen=True)
-class OwnMatrices:
+class ExternalMatrices:
     """Structure of ``n`` unknowns, given by its matrices.
 
     Attributes
@@ -83,7 +83,7 @@ class OwnMatrices:
         Unknowns that a file holds and that are left out.
     taken
         Name of the matrix used for each part.
-    left
+    unused
         Names of the matrices in the files that are not used.
     offered
         Unused matrices that a missing damping or load could be, as ``plant.mat:D``.
@@ -94,10 +94,10 @@ class OwnMatrices:
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
-    >>> from fe_models.matrices import OwnMatrices, Unknown
+    >>> from fe_models.matrices import ExternalMatrices, Unknown
     >>> unknowns = Unknown("a", "x"), Unknown("b", "x")
     >>> K, M = 1e3 * sp.identity(2, format="csr"), 1e-3 * sp.identity(2, format="csr")
-    >>> print(OwnMatrices(K, M, None, np.zeros((2, 0)), unknowns).moved_mass())
+    >>> print(ExternalMatrices(K, M, None, np.zeros((2, 0)), unknowns).moved_mass())
     {'x': 0.002}
     """
 
@@ -109,7 +109,7 @@ class OwnMatrices:
     places: Array | None = None
     held: tuple[Unknown, ...] = ()
     taken: Mapping[str, str] | None = None
-    left: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
     offered: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -174,12 +174,12 @@ class GivenUnknowns:
         checks.settle(self, places=places)
 
 
-def own_matrices(
+def external_matrices(
     sources: Mapping[str, tuple[Path, str]],
     file: Path | None = None,
     given: GivenUnknowns | None = None,
     units: FileUnits | None = None,
-) -> OwnMatrices:
+) -> ExternalMatrices:
     """Return matrices from files, in mm, N, s and t.
 
     Parameters
@@ -207,11 +207,11 @@ def own_matrices(
     >>> import tempfile
     >>> from pathlib import Path
     >>> import numpy as np
-    >>> from fe_models.matrices import FileUnits, GivenUnknowns, Unknown, own_matrices
+    >>> from fe_models.matrices import FileUnits, GivenUnknowns, Unknown, external_matrices
     >>> path = Path(tempfile.mkdtemp()) / "row.npz"
     >>> np.savez(path, K=np.array([[2e6, -1e6], [-1e6, 1e6]]), M=np.diag([2.0, 1.0]))
     >>> rows = Unknown("a", "x"), Unknown("b", "x")
-    >>> row = own_matrices({}, path, GivenUnknowns(rows), FileUnits(length=1e3))
+    >>> row = external_matrices({}, path, GivenUnknowns(rows), FileUnits(length=1e3))
     >>> print(row.stiffness.toarray(), row.moved_mass(), row.taken)
     [[ 2000. -1000.]
      [-1000.  1000.]] {'x': 0.003} {'stiffness': 'K', 'mass': 'M'}
@@ -237,7 +237,7 @@ def own_matrices(
     loads = aligned.get(LOADS, sp.csr_matrix((size, 0))).toarray()[free]
     energy = units.force * units.length
     return _named(
-        OwnMatrices(
+        ExternalMatrices(
             _there(square(STIFFNESS, energy)),
             _there(square(MASS, units.mass * units.length**2)),
             square(DAMPING, energy),
@@ -336,7 +336,7 @@ def _aligned(part: Part, unknowns: tuple[Unknown, ...]) -> sp.csr_matrix:
     return sp.csr_matrix((entries.data, (to[entries.row], columns)), shape=shape)
 
 
-def _named(matrices: OwnMatrices, given: GivenUnknowns | None) -> OwnMatrices:
+def _named(matrices: ExternalMatrices, given: GivenUnknowns | None) -> ExternalMatrices:
     """Return the matrices with the names and positions that are given for nodes."""
     if given is None or given.nodes is None:
         return matrices

@@ -70,7 +70,7 @@ class Surface:
 
     heights: Array
     bulges: Array
-    left: Array | None = None
+    form_error: Array | None = None
     straight: int = 0
 
     @classmethod
@@ -92,7 +92,7 @@ class Surface:
     @property
     def error(self) -> float:
         """Largest estimated error of the bulges [mm]."""
-        return 0.0 if self.left is None else float(self.left.max(initial=0.0))
+        return 0.0 if self.form_error is None else float(self.form_error.max(initial=0.0))
 
     def part(self, nodes: Indices, facets: Mask) -> Surface:
         """Return the surface on some nodes and facets."""
@@ -109,8 +109,8 @@ class Surface:
         return self._with(nodes, bulges)
 
     def _with(self, nodes: Indices, bulges: Array) -> Surface:
-        left = None if self.left is None else self.left[nodes]
-        return replace(self, heights=self.heights[nodes], bulges=bulges, left=left)
+        left = None if self.form_error is None else self.form_error[nodes]
+        return replace(self, heights=self.heights[nodes], bulges=bulges, form_error=left)
 
     def over(self, coordinates: Array, facets: Indices, x: Array, y: Array) -> Array:
         """Return the height ``(nx, ny)`` [mm] at grid points, NaN beside the face.

@@ -94,7 +94,7 @@ class _Read:
         mesh = flat.mesh()
         lower = (text for shape, text in self._caveats if DIMENSION[shape] < flat.top)
         notes = (*flat.notes, *lower)
-        return replace(mesh, left=notes, scene=Scene(ignored=notes))
+        return replace(mesh, unused=notes, scene=Scene(ignored=notes))
 
     def _wrong(self, what: str) -> MeshError:
         return MeshError(f"{self._path}: {what}")

@@ -66,7 +66,7 @@ class GroupedMesh:
         Elements of each body, facets of each surface, and rows of each node set, by name.
     midsides
         Points in the middle of edges, if there are elements of second order.
-    left
+    unused
         Lines of the file that describe more than a mesh and are not imported.
     scene
         Materials, contacts, supports and loads of the file.
@@ -80,7 +80,7 @@ class GroupedMesh:
     surfaces: dict[str, Blocks]
     node_sets: dict[str, Indices]
     midsides: Midsides | None = None
-    left: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
     scene: Scene = field(default_factory=Scene)
     unit: LengthUnit = field(default_factory=LengthUnit)
 

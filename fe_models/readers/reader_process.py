@@ -57,7 +57,9 @@ def reading(path: Path) -> Iterator[None]:
         ) from error
 
 
-def read_apart(read: Callable[..., GroupedMesh], path: Path, *arguments: Any) -> GroupedMesh:
+def read_in_subprocess(
+    read: Callable[..., GroupedMesh], path: Path, *arguments: Any
+) -> GroupedMesh:
     """Return the mesh that ``read`` returns for a file and further ``arguments``, in a new process.
 
     Raises :class:`MeshError` if it raises anything, or if the file crashes the process.

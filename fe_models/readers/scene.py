@@ -10,7 +10,7 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class SaidContact:
+class FileContact:
     """Two faces in contact, with friction if the file gives any."""
 
     faces: tuple[str, str]
@@ -19,7 +19,7 @@ class SaidContact:
 
 
 @dataclass(frozen=True)
-class SaidSupport:
+class FileSupport:
     """Group whose displacements are held along axes of the file, such as ``xz``."""
 
     group: str
@@ -28,7 +28,7 @@ class SaidSupport:
 
 
 @dataclass(frozen=True)
-class SaidLoad:
+class FileLoad:
     """Load on a group, or on the mass of all bodies, with its factors at the ends of the steps.
 
     Attributes
@@ -73,9 +73,9 @@ class Scene:
     """
 
     materials: dict[str, dict[str, float]] = field(default_factory=dict)
-    contacts: tuple[SaidContact, ...] = ()
-    supports: tuple[SaidSupport, ...] = ()
-    loads: tuple[SaidLoad, ...] = ()
+    contacts: tuple[FileContact, ...] = ()
+    supports: tuple[FileSupport, ...] = ()
+    loads: tuple[FileLoad, ...] = ()
     steps: int = 0
     ignored: tuple[str, ...] = ()
 

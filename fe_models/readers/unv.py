@@ -105,7 +105,7 @@ def read_unv(path: Path) -> GroupedMesh:
     for dataset in groups:
         _groups(scope, dataset)
     notes = (*left, *_plane_kinds(scope))
-    return replace(FlatFile(scope).mesh(), left=notes, scene=Scene(ignored=notes), unit=unit)
+    return replace(FlatFile(scope).mesh(), unused=notes, scene=Scene(ignored=notes), unit=unit)
 
 
 def _datasets(path: Path) -> Iterator[UnvDataset]:

@@ -227,7 +227,7 @@ def march_history(
     >>> from sa_solver import ContactLoadPath, ElasticPair, Grid, HalfSpace, Material, march_history
     >>> from sa_solver.reference.hertz import HertzCylinder
     >>> from sa_solver.reference.line_partial_slip import ShearedCylinder
-    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.strips(1.0, 128)
+    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.line_contact(1.0, 128)
     >>> half_space = HalfSpace(grid, ElasticPair(steel, steel))
     >>> hertz = HertzCylinder(200.0, 50.0, half_space.pair.contact_modulus)
     >>> values = np.zeros((31, 6))
@@ -342,7 +342,7 @@ def _march(
 
     Each increment is split into ``parts``.
     """
-    states, state = [], contact.apart(height)
+    states, state = [], contact.unloaded_state(height)
     for row in range(len(path)):
         passed = []
         for part in range(1, parts + 1):

@@ -281,7 +281,7 @@ def march_loop(contact: FrictionalContact, height: Array, path: LoopPath) -> Tan
     >>> from sa_solver import march_loop
     >>> from sa_solver.reference.hertz import HertzCylinder
     >>> from sa_solver.reference.line_partial_slip import ShearedCylinder
-    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.strips(1.0, 128)
+    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.line_contact(1.0, 128)
     >>> half_space = HalfSpace(grid, ElasticPair(steel, steel))
     >>> hertz = HertzCylinder(200.0, 50.0, half_space.pair.contact_modulus)
     >>> contact = FrictionalContact(half_space, friction=0.5)
@@ -405,7 +405,7 @@ def _press(contact: FrictionalContact, height: Array, path: LoopPath) -> Contact
     tilts = path.moments is None
     motion = (False, False, False, tilts and not contact.grid.line, tilts, False)
     Mx, My = path.moments or (0.0, 0.0)
-    state = contact.apart(height)
+    state = contact.unloaded_state(height)
     for step in range(1, steps + 1):
         values = np.array([path.P, 0.0, 0.0, Mx, My, 0.0]) * (step / steps)
         state = _converged(contact.advance(state, height, ContactLoad(values, motion)))

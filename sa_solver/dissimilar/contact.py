@@ -140,7 +140,7 @@ class CoupledContact:
     >>> from sa_solver import CoupledContact, ElasticPair, Grid, HalfSpace, Material
     >>> from sa_solver.reference.hertz import HertzCylinder
     >>> rigid, titanium = Material(float("inf"), 0.3), Material(young=115e3, poisson=0.29)
-    >>> grid = Grid.strips(1.2, 128)
+    >>> grid = Grid.line_contact(1.2, 128)
     >>> half_space = HalfSpace(grid, ElasticPair(rigid, titanium))
     >>> hertz = HertzCylinder(400.0, 50.0, half_space.pair.contact_modulus)
     >>> for friction in (0.0, 0.5):

@@ -83,7 +83,7 @@ class SubsurfaceStress:
 
     >>> import numpy as np
     >>> from sa_solver import Grid, Material, SubsurfaceStress
-    >>> grid = Grid.strips(2.0, 200)
+    >>> grid = Grid.line_contact(2.0, 200)
     >>> traction = np.zeros((3, 200, 1))
     >>> traction[2] = 1000.0 * np.sqrt(np.maximum(0.0, 1.0 - (grid.x / 0.5) ** 2))
     >>> body = SubsurfaceStress(grid, Material(young=210e3, poisson=0.3), body=1)
@@ -335,7 +335,7 @@ def sections(
     >>> import numpy as np
     >>> from sa_solver import Grid, Material, SubsurfaceStress
     >>> from sa_solver.half_space.subsurface import sections
-    >>> grid, steel = Grid.strips(2.0, 50), Material(young=210e3, poisson=0.3)
+    >>> grid, steel = Grid.line_contact(2.0, 50), Material(young=210e3, poisson=0.3)
     >>> traction = np.zeros((3, 50, 1))
     >>> traction[2] = 1000.0 * np.sqrt(np.maximum(0.0, 1.0 - (grid.x / 0.5) ** 2))
     >>> bodies = [SubsurfaceStress(grid, steel, number) for number in (1, 2)]

@@ -143,7 +143,7 @@ class NormalContact:
 
     >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, NormalContact
     >>> from sa_solver.reference.hertz import HertzCylinder
-    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.strips(1.0, 256)
+    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.line_contact(1.0, 256)
     >>> half_space = HalfSpace(grid, ElasticPair(steel, steel))
     >>> hertz = HertzCylinder(200.0, 50.0, half_space.pair.contact_modulus)
     >>> state = NormalContact(half_space).solve(hertz.gap(grid.x), P=200.0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from sa_solver.types import Mask
 
-FEWEST_CELLS, FEWEST_STRIPS = 10, 16
+FEWEST_CELLS, FEWEST_LINE_CELLS = 10, 16
 """Least number of cells across a resolved contact, for an area and for a line. The error of its
 size is then 8 %, and that of the pressure 1 % or 0.4 %."""
 
@@ -42,7 +42,7 @@ def is_point(pressed: Mask) -> bool:
 
 def fewest_across(line: bool) -> int:
     """Return the least number of cells across a resolved contact, of a ``line`` or an area."""
-    return FEWEST_STRIPS if line else FEWEST_CELLS
+    return FEWEST_LINE_CELLS if line else FEWEST_CELLS
 
 
 def peak_error(cells: int) -> float:

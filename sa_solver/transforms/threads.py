@@ -22,7 +22,7 @@ def threads() -> int:
     return int(setting) if setting.isdecimal() and int(setting) > 0 else cores or 1
 
 
-def at_once(jobs: Sequence[Callable[[], T]]) -> list[T]:
+def run_parallel(jobs: Sequence[Callable[[], T]]) -> list[T]:
     """Run ``jobs`` in parallel threads and return their results.
 
     If a job raises an exception, or Ctrl-C is pressed, the exception is raised again after the
@@ -31,8 +31,8 @@ def at_once(jobs: Sequence[Callable[[], T]]) -> list[T]:
     Examples
     --------
     >>> from functools import partial
-    >>> from sa_solver.transforms.threads import at_once
-    >>> at_once([partial(pow, 2, 10), partial(pow, 3, 4)])
+    >>> from sa_solver.transforms.threads import run_parallel
+    >>> run_parallel([partial(pow, 2, 10), partial(pow, 3, 4)])
     [1024, 81]
     """
     shared = min(threads(), len(jobs))

@@ -88,7 +88,9 @@ def sheared(pair: ElasticPair, cells: int) -> tuple[ContactState, ContactState, 
     contact, times = FrictionalContact(half_space, 0.5), []
     for _ in range(3):
         begin = time.process_time()
-        pressed = contact.advance(contact.apart(height), height, ContactLoad(load * np.eye(6)[0]))
+        pressed = contact.advance(
+            contact.unloaded_state(height), height, ContactLoad(load * np.eye(6)[0])
+        )
         force = load * np.array([1.0, 0.375, 0.0, 0.0, 0.0, 0.0])
         moved = contact.advance(pressed, height, ContactLoad(force))
         times.append(time.process_time() - begin)

@@ -87,7 +87,7 @@ def marched(
     starts: Sequence[ContactStart | None] = (None,) * 22,
 ) -> list[ContactState]:
     """Return the states of a cycle from rest."""
-    states = [contact.apart(height)]
+    states = [contact.unloaded_state(height)]
     for values, start in zip(loads, starts, strict=True):
         states.append(contact.advance(states[-1], height, ContactLoad(values), start))
         assert states[-1].converged

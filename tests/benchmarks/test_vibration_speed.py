@@ -130,7 +130,7 @@ def test_response_of_the_contacts(
     odd: int, contacts: HarmonicBalance, record: dict[str, float]
 ) -> None:
     """Two reduced specimens have 121 contacts with gaps, preload, harmonic 0 and odd ones."""
-    problem = contacts.refined(Resolution((0, *range(1, 2 * odd, 2)), SAMPLES))
+    problem = contacts.with_resolution(Resolution((0, *range(1, 2 * odd, 2)), SAMPLES))
     begin = time.perf_counter()
     branch = along_frequency(problem, CONTACTS_FORCE, CONTACTS_SPAN, control=STEPS)
     seconds = time.perf_counter() - begin
@@ -143,7 +143,7 @@ def test_response_of_the_contacts(
 @pytest.mark.slow
 def test_response_of_sliding_contacts(contacts: HarmonicBalance, record: dict[str, float]) -> None:
     """The same response is solved under a force that slides all contacts, past 39 Hz."""
-    problem = contacts.refined(Resolution((0, *range(1, 10, 2)), SAMPLES))
+    problem = contacts.with_resolution(Resolution((0, *range(1, 10, 2)), SAMPLES))
     begin = time.process_time()
     branch = along_frequency(problem, SLIDING_FORCE, SLIDING_SPAN, control=STEPS)
     seconds = time.process_time() - begin

@@ -39,8 +39,8 @@ def test_every_entry_is_on_the_page_of_its_kind(kind):
     wanted = set(paths_of(schema, schema))
     assert len(wanted) > 15
     page = case_reference.case_page(kind, model)
-    told = set(re.findall(r"^`([^`]+)`\n: ", page, re.MULTILINE))
-    assert told == wanted
+    reported = set(re.findall(r"^`([^`]+)`\n: ", page, re.MULTILINE))
+    assert reported == wanted
 
 
 @pytest.mark.parametrize("kind", list(kinds()))

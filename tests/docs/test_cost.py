@@ -47,10 +47,10 @@ def test_how_large_follows_from_the_points(cost):
 def test_powers_in_words_are_those_of_the_points(cost):
     """All exponents are listed in comments at the end of the page."""
     charts, _ = cost
-    told = re.findall(r"^% (\w+) (\w+) (\d\.\d)$", PAGE, flags=re.MULTILINE)
-    assert len(told) >= 5
+    reported = re.findall(r"^% (\w+) (\w+) (\d\.\d)$", PAGE, flags=re.MULTILINE)
+    assert len(reported) >= 5
     places = {line.work: name for name, chart in charts.CHARTS.items() for line in chart.lines}
-    for work, measure, power in told:
+    for work, measure, power in reported:
         points = charts.stored(places[work])[work]
         seen = charts._seen(measure, points[measure])
         found = charts.slope(points["size"][seen], points[measure][seen])

@@ -59,9 +59,9 @@ def test_too_few_harmonics_for_lift_off_say_so(highest, least, resolved):
     problem = lifting(highest, 512)
     solution = problem.solve(FREQUENCY, 1.0)
     assert solution.converged
-    told = resolution_error(problem, solution).vibration
-    assert told > least
-    assert told / 3.0 < error_of(solution, resolved) < 3.0 * told
+    reported = resolution_error(problem, solution).vibration
+    assert reported > least
+    assert reported / 3.0 < error_of(solution, resolved) < 3.0 * reported
 
 
 def test_too_few_harmonics_for_lift_off_are_added_if_asked(resolved):
@@ -79,10 +79,10 @@ def test_too_few_samples_say_so(samples, resolved):
     problem = lifting(5, samples)
     rough = problem.solve(FREQUENCY, 1.0)
     assert rough.converged
-    told = resolution_error(problem, rough).vibration
+    reported = resolution_error(problem, rough).vibration
     error = error_of(rough, resolved)
     assert error > 1e-3
-    assert error / 3.0 < told < 3.0 * error
+    assert error / 3.0 < reported < 3.0 * error
 
 
 def test_what_the_finest_resolution_allowed_leaves_is_told():

@@ -18,9 +18,9 @@ from wear.steps.stepping import SlidingCycle, WearingContact, WearState
 BODY = Material(115e3, 0.29)
 PAIR = ElasticPair(BODY, BODY)
 GRIDS = {
-    "line 16": Grid.strips(4.0, 16),
-    "line 33": Grid.strips(4.0, 33),
-    "line 64": Grid.strips(4.0, 64),
+    "line 16": Grid.line_contact(4.0, 16),
+    "line 33": Grid.line_contact(4.0, 33),
+    "line 64": Grid.line_contact(4.0, 64),
     "square 12": Grid.covering((4.0, 4.0), (12, 12)),
     "square 21": Grid.covering((4.0, 4.0), (21, 21)),
     "long cells": Grid.covering((4.0, 12.0), (24, 16)),

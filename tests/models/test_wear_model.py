@@ -41,7 +41,7 @@ class Interrupted(fretscale.Observer):
     def __init__(self, jumps):
         self.jumps = jumps
 
-    def jumped(self, before, after):
+    def jump_finished(self, before, after):
         if after.jump == self.jumps:
             raise KeyboardInterrupt
 

@@ -314,7 +314,7 @@ def _motion(
         acceleration=accelerations(model, motion, force, joint_force),
         joint_displacement=stretch[:, :, None],
         joint_force=joint_force[:, :, None],
-        companion=None,
+        coarse_run=None,
         joint_state=run.sliders,
         energies=Energies(
             kinetic=quadratic(model.mass, velocity),

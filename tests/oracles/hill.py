@@ -41,13 +41,13 @@ def hill_multipliers(
         stiffness += np.kron(slopes, np.outer(row, row))
     damping = 2.0 * np.kron(rate, model.mass) + np.kron(one, model.damping)
     inverse = sl.inv(np.kron(one, model.mass))
-    companion = np.block(
+    coarse_run = np.block(
         [
             [np.zeros_like(stiffness), np.eye(len(stiffness))],
             [-inverse @ stiffness, -inverse @ damping],
         ]
     )
-    exponents = np.linalg.eigvals(companion)
+    exponents = np.linalg.eigvals(coarse_run)
     central = exponents[np.argsort(np.abs(exponents.imag), kind="stable")[: 2 * count]]
     multipliers = np.exp(central / motion.frequency)
     return multipliers[np.argsort(-np.abs(multipliers), kind="stable")]

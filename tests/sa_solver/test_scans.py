@@ -145,13 +145,13 @@ def test_what_is_no_scan_is_refused():
     with pytest.raises(InputError, match="3 points are too few to fit a plane: give at least 6"):
         levelled(Scan(np.array([[0.0, 1.0], [2.0, np.nan]]), (1.0, 1.0)), "plane")
     with pytest.raises(InputError, match="a scan of 4 columns: give a profile"):
-        resampled(filled(holes), Grid.strips(2.0, 8))
+        resampled(filled(holes), Grid.line_contact(2.0, 8))
 
 
 def test_profiles_go_onto_strips():
     edges = np.linspace(-0.5, 0.5, 101)
     profile = Scan(np.diff(edges**3 / 3)[:, None] / 0.01, (0.01, 1.0))
-    grid = Grid.strips(0.8, 30)
+    grid = Grid.line_contact(0.8, 30)
     got = resampled(profile, grid).heights
     np.testing.assert_allclose(got, grid.x**2 + grid.pitch[0] ** 2 / 12, atol=1e-13)
     assert cell_means(np.ones((2, 3)), np.arange(3.0), np.array([0.5, 1.5])).shape == (1, 3)

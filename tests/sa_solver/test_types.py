@@ -83,7 +83,7 @@ def test_a_line_grid_has_one_row_one_millimetre_long(shape, pitch):
 
 
 def test_strips_cover_their_width_about_the_origin():
-    grid = Grid.strips(3.0, 6)
+    grid = Grid.line_contact(3.0, 6)
     assert grid.line
     assert grid.shape == (6, 1)
     assert grid.size == pytest.approx((3.0, 1.0))
@@ -94,7 +94,7 @@ def test_strips_cover_their_width_about_the_origin():
 
 def test_strips_of_negative_width_are_refused():
     with pytest.raises(ValueError, match="no area"):
-        Grid.strips(-1.0, 4)
+        Grid.line_contact(-1.0, 4)
 
 
 def test_a_covering_grid_has_the_size_it_covers():

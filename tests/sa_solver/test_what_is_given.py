@@ -38,7 +38,7 @@ TRACTION = np.stack([0.1 * LIMIT, 0.0 * LIMIT, LIMIT])
 
 def advanced(height, pair=ALIKE, load=None):
     contact = FrictionalContact(HalfSpace(GRID, pair), 0.5)
-    return contact.advance(contact.apart(height), height, load or ContactLoad(P=P))
+    return contact.advance(contact.unloaded_state(height), height, load or ContactLoad(P=P))
 
 
 # A valid field for each function, and the numbers that follow from it.
@@ -129,7 +129,7 @@ def test_what_is_no_number_is_refused(value):
         lambda: Material(210e3, value),
         lambda: ElasticPair.from_contact_modulus(value),
         lambda: HertzSphere(value, 10.0, 1e5),
-        lambda: Grid.strips(value, 8),
+        lambda: Grid.line_contact(value, 8),
     )
     assert_refused(InputError, attempts)
 

@@ -26,13 +26,13 @@ RADIUS = 10.0
 
 def cylinder(**settings) -> InterfaceSettings:
     """Return a line contact with 70 cells."""
-    grid = Grid.strips(1.4, 70)
+    grid = Grid.line_contact(1.4, 70)
     return interface(grid, grid.x**2 / (2.0 * RADIUS), **settings)
 
 
 def patch(**settings) -> InterfaceSettings:
     """Return a flat of 1 mm on a step that never touches."""
-    grid = Grid.strips(1.2, 24)
+    grid = Grid.line_contact(1.2, 24)
     return interface(grid, np.where(np.abs(grid.x) < 0.5, 0.0, 1.0), **settings)
 
 

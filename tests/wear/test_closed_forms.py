@@ -109,7 +109,7 @@ def punch(grid: Grid, half_width: float, half_length: float = np.inf) -> Array:
 @pytest.mark.parametrize(
     ("grid", "form", "area"),
     [
-        (Grid.strips(1.2, 60), punch(Grid.strips(1.2, 60), 0.5), 1.0),
+        (Grid.line_contact(1.2, 60), punch(Grid.line_contact(1.2, 60), 0.5), 1.0),
         (
             Grid.covering((1.2, 0.8), (24, 16)),
             punch(Grid.covering((1.2, 0.8), (24, 16)), 0.5, 0.3),
@@ -139,7 +139,7 @@ def test_pressure_on_a_patch_becomes_uniform_as_its_modes_decay() -> None:
 
     λ comes from the dense compliance, between pressures that are even in x and have no resultant.
     """
-    grid, load, jump = Grid.strips(1.2, 60), 100.0, 1.0
+    grid, load, jump = Grid.line_contact(1.2, 60), 100.0, 1.0
     form = punch(grid, 0.5)
     on = np.flatnonzero(form == 0.0)
     march = March(grid, form, load)
@@ -165,7 +165,7 @@ def test_pressure_on_a_patch_becomes_uniform_as_its_modes_decay() -> None:
 @pytest.mark.parametrize("shares", [(1.0, 1.0), (0.0, 2.0), (1.5, 0.5)])
 def test_a_cylinder_becomes_conforming(shares: tuple[float, float]) -> None:
     """At a/b = 0.2 depth and pressure are met to 0.2 %, and the width to a cell, on either body."""
-    grid, load, volume = Grid.strips(1.4, 140), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
+    grid, load, volume = Grid.line_contact(1.4, 140), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     march = March(grid, grid.x**2 / (2.0 * RADIUS), load, shares)
     middle = march.to_volume(volume, load, 60)
     b, depth, _ = worn_cylinder(load, volume, RADIUS, MODULUS)
@@ -201,7 +201,7 @@ def test_the_worn_cylinder_converges_with_grid_and_jumps() -> None:
     _, depth, _ = worn_cylinder(load, volume, RADIUS, MODULUS)
     errors = []
     for count in (35, 70, 140, 280):
-        grid = Grid.strips(1.4, count)
+        grid = Grid.line_contact(1.4, count)
         march = March(grid, grid.x**2 / (2.0 * RADIUS), load)
         march.to_volume(volume, load, count // 4)
         errors.append(abs(march.depth.max() / depth - 1.0))
@@ -266,7 +266,7 @@ class MovingMarch:
 def test_a_flat_that_does_not_wear_stays_out_of_it(stroke: float) -> None:
     """If only the cylinder wears, its shape is that of small strokes, however far it slides."""
     width = 1.4 + stroke
-    grid, load = Grid.strips(width, round(width / 0.02)), 50.0
+    grid, load = Grid.line_contact(width, round(width / 0.02)), 50.0
     volume = 2.0 / 3.0 * 0.5**3 / RADIUS
     march = MovingMarch(grid, grid.x**2 / (2.0 * RADIUS), load, stroke, 4, 0.0)
     march.to_volume(volume, 15)
@@ -284,7 +284,7 @@ def test_over_a_long_stroke_the_slider_wears_alone_and_the_flat_evenly(stroke: f
     form is accurate to (b/s)².
     """
     width, load, volume = stroke + 1.2, 20.0, 2.0 / 3.0 * 0.3**3 / RADIUS
-    grid = Grid.strips(width, round(width / 0.02))
+    grid = Grid.line_contact(width, round(width / 0.02))
     march = MovingMarch(grid, grid.x**2 / (2.0 * RADIUS), load, stroke, 10, 0.5)
     march.to_volume(2.0 * volume, 12)
     b, depth, _ = worn_cylinder(load, volume, RADIUS, MODULUS)
@@ -305,7 +305,7 @@ def test_neglecting_the_motion_costs_the_square_of_the_stroke() -> None:
 
     :data:`wear.contact.moving.LARGE_STROKE` relies on this.
     """
-    grid, load, volume = Grid.strips(1.6, 80), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
+    grid, load, volume = Grid.line_contact(1.6, 80), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     form = grid.x**2 / (2.0 * RADIUS)
     still = March(grid, form, load)
     still.to_volume(volume, load, 20)

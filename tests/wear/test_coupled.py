@@ -179,10 +179,10 @@ class Diary(Observer):
     def begin(self, state):
         self.events.append(("begin", state))
 
-    def jumping(self, state, cycles):
+    def jump_started(self, state, cycles):
         self.events.append(("jumping", state, cycles))
 
-    def jumped(self, before, after):
+    def jump_finished(self, before, after):
         self.events.append(("jumped", before, after))
 
 
@@ -193,13 +193,15 @@ def test_observers_see_every_state_once_and_in_order() -> None:
     assert diaries[0].events == diaries[1].events
     seen = [event for event in diaries[0].events if event[0] not in ("stage", "over")]
     assert seen[0] == ("begin", states[0])
-    for number, (jumping, jumped) in enumerate(zip(seen[1::2], seen[2::2], strict=True)):
-        assert jumping[0] == "jumping"
-        assert jumping[1] is states[number]
-        assert jumped[1] is states[number]
-        assert jumped[2] is states[number + 1]
+    for number, (jump_started, jump_finished) in enumerate(
+        zip(seen[1::2], seen[2::2], strict=True)
+    ):
+        assert jump_started[0] == "jumping"
+        assert jump_started[1] is states[number]
+        assert jump_finished[1] is states[number]
+        assert jump_finished[2] is states[number + 1]
         cycles = states[number + 1].cycles[-1] - states[number].cycles[-1]
-        assert jumping[2] == pytest.approx(cycles)
+        assert jump_started[2] == pytest.approx(cycles)
     assert len(seen) == 1 + 2 * (len(states) - 1)
     stages = [event[1] for event in diaries[0].events if event[0] == "stage"]
     assert stages.count("wear") == stages.count("drift probe") == len(states) - 1

@@ -127,7 +127,7 @@ def test_partial_slip_wears_a_cylinder_down_to_its_stick_zone() -> None:
     error with cells of c/16 is 1.4 %.
     """
     load, shear = 400.0, 100.0
-    modulus, grid = PAIR.contact_modulus, Grid.strips(0.9, 72)
+    modulus, grid = PAIR.contact_modulus, Grid.line_contact(0.9, 72)
     half = np.sqrt(4.0 * load * RADIUS / (np.pi * modulus))
     stick = half * np.sqrt(1.0 - shear / (FRICTION * load))
     loads = loads_of(P=[load, load], Qx=[shear, -shear])

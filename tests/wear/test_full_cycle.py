@@ -172,7 +172,7 @@ def test_loads_that_no_contact_carries_are_reported(first, column):
 # --- surfaces that pass over each other -----------------------------------------------------------
 
 AMPLITUDE, MU = 0.025, 0.9
-LINE, AREA = Grid.strips(0.4, 96), Grid.covering((0.4, 0.4), (24, 24))
+LINE, AREA = Grid.line_contact(0.4, 96), Grid.covering((0.4, 0.4), (24, 24))
 WITHOUT_NU = Material(200e3, 0.0)
 
 

@@ -73,7 +73,9 @@ def test_jumps_that_are_left_are_foreseen(jump, tolerance, left):
     contacts = in_turn([patch(stepper=ImplicitStepper(control))])
     loop = CoupledWear(settings, ConstantLoads(histories), contacts)
     state, _ = loop.begin(histories)
-    foreseen = [loop.jumps_left(state)] + [loop.jumps_left(each) for each in loop.march(state)]
+    foreseen = [loop.remaining_jumps(state)] + [
+        loop.remaining_jumps(each) for each in loop.march(state)
+    ]
     true = np.arange(len(foreseen))[::-1]
     assert left is None or foreseen == left
     assert foreseen[-1] == 0
@@ -90,7 +92,7 @@ def test_jumps_that_grow_are_foreseen_as_they_grow() -> None:
         cycles = np.cumsum([0.0, *lengths])
         steady.next_cycles = following
         state = SimpleNamespace(cycles=cycles, interfaces=(steady,))
-        assert loop.jumps_left(state) == pytest.approx(left, abs=1)
+        assert loop.remaining_jumps(state) == pytest.approx(left, abs=1)
 
 
 def test_contacts_with_different_steps_end_together() -> None:

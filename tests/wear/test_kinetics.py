@@ -16,7 +16,7 @@ CYCLES = np.arange(0.0, 11.0) * 1e4
 BODY = Material(120e3, 0.0)
 WIDTH, CROWN, LOAD = 4.0, 1000.0, 100.0  # mm, mm, N/mm
 WEAR = 8e-11  # depth per pressure and cycle [mm/MPa]
-GRID = Grid.strips(WIDTH, 48)
+GRID = Grid.line_contact(WIDTH, 48)
 
 
 def depths_of_pad(cycles: Array) -> Array:

@@ -230,7 +230,7 @@ def test_what_has_no_meaning_is_refused(attempt) -> None:
 
 def test_a_gap_may_be_a_list_and_have_holes() -> None:
     """A cylinder with a slot in its middle loses α µ P s per cycle, and nothing in the slot."""
-    grid, steel = Grid.strips(1.4, 70), Material(210e3, 0.3)
+    grid, steel = Grid.line_contact(1.4, 70), Material(210e3, 0.3)
     gap, slot = grid.x**2 / 20.0, np.abs(grid.x) < 0.05
     slip = np.zeros((1, 2, 70))
     slip[:, 0] = 0.04

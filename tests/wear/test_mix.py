@@ -198,8 +198,8 @@ def test_a_history_is_one_cycle_unless_mixed() -> None:
 
 
 def test_mean_energy_is_by_shares() -> None:
-    spent = [replace(loads, Edx=loads.P, Edy=0.5 * loads.P) for loads in (HEAVY[0], LIGHT[0])]
-    mixed = LoadHistory.mix(spent, (0.25, 0.75))
-    expected = 0.25 * spent[0].mean_energy + 0.75 * spent[1].mean_energy
+    cost = [replace(loads, Edx=loads.P, Edy=0.5 * loads.P) for loads in (HEAVY[0], LIGHT[0])]
+    mixed = LoadHistory.mix(cost, (0.25, 0.75))
+    expected = 0.25 * cost[0].mean_energy + 0.75 * cost[1].mean_energy
     assert mixed.mean_energy == pytest.approx(expected, rel=1e-14)
-    assert spent[0].mean_energy == pytest.approx(1.5 * spent[0].P.sum(), rel=1e-14)
+    assert cost[0].mean_energy == pytest.approx(1.5 * cost[0].P.sum(), rel=1e-14)

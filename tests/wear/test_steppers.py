@@ -17,10 +17,10 @@ from wear.steps.marching import advance_cycles
 from wear.steps.step_errors import ErrorControl, root_mean_square, steps_to_come
 from wear.steps.steppers import ExplicitStepper
 from wear.steps.stepping import SlidingCycle, WearingContact, WearState
-from wear.worn import Spent, WearStep
+from wear.worn import Cost, WearStep
 
 BODY = Material(115e3, 0.29)
-GRID = Grid.strips(8.0, 40)
+GRID = Grid.line_contact(8.0, 40)
 HALF_SPACE = HalfSpace(GRID, ElasticPair(BODY, BODY))
 CONTACT = NormalContact(HALF_SPACE)
 X = GRID.x / 4.0
@@ -127,7 +127,7 @@ def automatic(stepper, cycles: float) -> WearStep:
     limit = CONSTANT.stable_cycles(state)
     state = replace(state, starts=starts, next_cycles=4.0 * limit)
     end = advance_cycles(stepper, state, cycles, cycles, unchanging)
-    return replace(end, spent=end.spent + Spent(len(first.states)))
+    return replace(end, cost=end.cost + Cost(len(first.states)))
 
 
 @cache
@@ -159,7 +159,7 @@ def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> No
         assert error < 1.1 * tolerance
         assert error / 3.0 < estimate < 3.0 * error
         assert end.state.surfaces.depth.max() == pytest.approx(exact.max(), rel=tolerance)
-        steps.append(end.spent.steps)
+        steps.append(end.cost.steps)
     assert steps == sorted(set(steps))
 
 
@@ -187,18 +187,18 @@ def test_the_companion_takes_steps_of_twice_the_length(lengths, contact_at) -> N
     for pair in pairs:
         coarse = strang_step(coarse, pair * unit, contact_at)
     np.testing.assert_allclose(state.surfaces.depths, alone.surfaces.depths, rtol=1e-7)
-    missed = np.subtract(state.companion.surfaces.depths, state.surfaces.depths)
+    missed = np.subtract(state.coarse_run.surfaces.depths, state.surfaces.depths)
     guessed = contact_at is evolving and lengths[0] == lengths[1]
     np.testing.assert_allclose(
-        state.companion.surfaces.depths,
+        state.coarse_run.surfaces.depths,
         coarse.surfaces.depths,
         rtol=1e-7,
         atol=0.01 * np.abs(missed).max() if guessed else 0.0,
     )
-    assert state.companion.coarse is None
+    assert state.coarse_run.coarse is None
     np.testing.assert_allclose(state.errors, missed / (2.0**state.order - 1.0), atol=1e-18)
-    volume = state.companion.surfaces.depth.sum() * GRID.cell_area
-    assert volume == pytest.approx(3e-8 * state.companion.energy, rel=1e-10)
+    volume = state.coarse_run.surfaces.depth.sum() * GRID.cell_area
+    assert volume == pytest.approx(3e-8 * state.coarse_run.energy, rel=1e-10)
 
 
 def test_the_last_of_an_odd_number_of_steps_is_two() -> None:
@@ -209,7 +209,7 @@ def test_the_last_of_an_odd_number_of_steps_is_two() -> None:
     whole = strang_step(state, cycles, unchanging)
     np.testing.assert_allclose(step.state.surfaces.depths, fine.surfaces.depths, rtol=1e-7)
     np.testing.assert_allclose(
-        step.state.companion.surfaces.depths, whole.surfaces.depths, rtol=1e-7
+        step.state.coarse_run.surfaces.depths, whole.surfaces.depths, rtol=1e-7
     )
 
 
@@ -220,10 +220,10 @@ def test_a_companion_half_way_goes_on_where_increments_become_equal() -> None:
     alike = replace(CONSTANT, sliding=SlidingCycle(same, np.full((3, *GRID.shape), 0.02)))
     half_way = ImplicitStepper().step(waved(), cycles, 10.0 * cycles, unchanging).state
     after = ImplicitStepper().step(half_way, cycles, 10.0 * cycles, lambda _: alike).state
-    assert half_way.companion.coarse is not None
-    assert after.companion.coarse is None
-    own = alike.implicit_step(replace(half_way.companion, coarse=None), cycles).state
-    np.testing.assert_array_equal(after.companion.surfaces.depths, own.surfaces.depths)
+    assert half_way.coarse_run.coarse is not None
+    assert after.coarse_run.coarse is None
+    own = alike.implicit_step(replace(half_way.coarse_run, coarse=None), cycles).state
+    np.testing.assert_array_equal(after.coarse_run.surfaces.depths, own.surfaces.depths)
 
 
 def test_steps_that_go_alone_are_the_same_without_their_companion() -> None:
@@ -237,7 +237,7 @@ def test_steps_that_go_alone_are_the_same_without_their_companion() -> None:
         alone.state.surfaces.depths, compared.state.surfaces.depths, strict=True
     ):
         np.testing.assert_array_equal(ours, theirs)
-    assert alone.spent.contact_solves < compared.spent.contact_solves
+    assert alone.cost.contact_solves < compared.cost.contact_solves
 
 
 @pytest.mark.parametrize("kind", [ImplicitStepper, slow(SecondOrderStepper)])
@@ -272,7 +272,7 @@ def test_automatic_steps_take_a_sixth_of_the_explicit_ones() -> None:
     cycles = 150.0 * CONSTANT.stable_cycles(rounded())
     explicit = automatic(ExplicitStepper(fraction=1.0), cycles)
     implicit = automatic(ImplicitStepper(ErrorControl(0.01)), cycles)
-    assert implicit.spent.contact_solves <= explicit.spent.contact_solves / 6.0
+    assert implicit.cost.contact_solves <= explicit.cost.contact_solves / 6.0
     depth, other = (end.state.surfaces.depth for end in (implicit, explicit))
     assert depth.max() == pytest.approx(other.max(), rel=0.01)
     assert depth.sum() == pytest.approx(other.sum(), rel=0.01)
@@ -289,7 +289,7 @@ def test_an_absolute_tolerance_is_a_depth() -> None:
         for control in (ErrorControl(absolute=allowed), ErrorControl(relative=0.01))
     )
     # The companion may take one step more or less.
-    assert abs(absolute.spent.steps - relative.spent.steps) <= 4
+    assert abs(absolute.cost.steps - relative.cost.steps) <= 4
     assert root_mean_square(absolute.state.surfaces.depth - exact, exact) < allowed
 
 
@@ -298,7 +298,7 @@ def test_a_step_that_was_too_long_is_taken_again() -> None:
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())
     exact = exact_depth(cycles)
     end = advance_cycles(ImplicitStepper(ErrorControl(0.01)), rounded(), cycles, cycles, unchanging)
-    assert end.spent.contact_solves > 3 * end.spent.steps
+    assert end.cost.contact_solves > 3 * end.cost.steps
     assert end.state.surfaces.depth.max() == pytest.approx(exact.max(), rel=0.01)
 
 
@@ -307,7 +307,7 @@ def test_explicit_steps_keep_to_their_share_of_the_limit() -> None:
     end = advance_cycles(
         ExplicitStepper(fraction=0.5), rounded(), 10.0 * limit, 10.0 * limit, unchanging
     )
-    assert end.spent.steps >= 20
+    assert end.cost.steps >= 20
 
 
 @pytest.mark.parametrize(
@@ -368,7 +368,7 @@ def test_steps_grow_where_wear_slows_down() -> None:
         cycles = times * limit
         stepper = ImplicitStepper(ErrorControl(0.01))
         end = advance_cycles(stepper, begun, cycles, cycles, lambda _: contact)
-        taken.append(end.spent.steps)
+        taken.append(end.cost.steps)
         fixed = begun
         for jump in np.diff(np.r_[0.0, cycles * np.geomspace(1e-4, 1.0, 150)]):
             fixed = contact.implicit_step(fixed, float(jump)).state

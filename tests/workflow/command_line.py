@@ -86,7 +86,7 @@ class _BesideHere:
 
 
 def _in_order(
-    tasks: Sequence[processes.Task], beside: Any, done: Callable[[], None], own: int
+    tasks: Sequence[processes.Task], worker: Any, done: Callable[[], None], own: int
 ) -> list[Any]:
     return processes.share_out(tasks, done=done)
 
@@ -104,7 +104,7 @@ def runs_here() -> Iterator[None]:
 _ALONE = threading.Lock()
 
 
-def _run_job(job: Job, out: Path, unwanted: Callable[[], bool], one_thread: bool = True) -> str:
+def _run_job(job: Job, out: Path, abandoned: Callable[[], bool], one_thread: bool = True) -> str:
     try:
         with _ALONE:
             bring_to_end(job.load(), out / job.name)

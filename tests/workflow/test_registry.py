@@ -276,9 +276,9 @@ def stamp(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def test_new_structure_is_written_and_checked(stamp: Path) -> None:
-    said = done("check", stamp)
-    assert "stamp under 50 N" in said
-    assert "300,000 cycles" in said
+    printed = done("check", stamp)
+    assert "stamp under 50 N" in printed
+    assert "300,000 cycles" in printed
     assert "StampCase" in done("schema")
 
 

@@ -17,7 +17,7 @@ from wear.contact.interface import FirstContact, InterfaceContact, InterfaceStat
 from wear.steps.marching import advance_cycles
 from wear.steps.steppers import Contact, Stepper
 from wear.steps.stepping import failures_of
-from wear.worn import Spent, State, WornState
+from wear.worn import Cost, State, WornState
 
 KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
 """Columns of the kinetics of one interface, in mm, mm³ and N mm."""
@@ -48,9 +48,7 @@ class LastSolved(Generic[State, Solution]):
 class WearingContacts(Protocol[State]):
     """Protocol of contacts that wear together."""
 
-    def jump(
-        self, states: Sequence[State], cycles: float, left: float
-    ) -> list[tuple[State, Spent]]:
+    def jump(self, states: Sequence[State], cycles: float, left: float) -> list[tuple[State, Cost]]:
         """Wear ``cycles`` of the ``left`` cycles of the run; return the states and their costs."""
         ...
 
@@ -83,14 +81,12 @@ class SoleContact(Generic[State, Contact]):
     steps: Steps = COMPUTED
     reached: Callable[[float, float], None] = lambda cycles, done: None
 
-    def jump(
-        self, states: Sequence[State], cycles: float, left: float
-    ) -> list[tuple[State, Spent]]:
+    def jump(self, states: Sequence[State], cycles: float, left: float) -> list[tuple[State, Cost]]:
         (state,), reached = states, partial(self.reached, cycles)
         worn = advance_cycles(
             self.stepper, state, cycles, left, self.contact_at, self.steps, reached
         )
-        return [(worn.state, worn.spent)]
+        return [(worn.state, worn.cost)]
 
     def kinetics(self, states: Sequence[State]) -> Array:
         (state,) = states
@@ -126,12 +122,12 @@ class Contacts:
 
     def jump(
         self, states: Sequence[InterfaceState], cycles: float, left: float
-    ) -> list[tuple[InterfaceState, Spent]]:
+    ) -> list[tuple[InterfaceState, Cost]]:
         return self.call("jump", states, self.each(cycles), self.each(left))
 
     def follow(
         self, states: Sequence[InterfaceState], histories: Sequence[FaceLoads]
-    ) -> list[tuple[InterfaceState, Spent]]:
+    ) -> list[tuple[InterfaceState, Cost]]:
         triples = zip(self.contacts, states, histories, strict=True)
         return [contact.follow(state, history) for contact, state, history in triples]
 

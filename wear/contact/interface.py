@@ -39,7 +39,7 @@ from wear.steps.stepping import (
     WearState,
 )
 from wear.surfaces import Surfaces
-from wear.worn import Spent
+from wear.worn import Cost
 
 
 class MotionError(InputError):
@@ -92,7 +92,7 @@ class FirstContact:
         Whether the contact reaches the border of the grid in any increment.
     largest_residual
         Largest residual of the contact solver.
-    spent
+    cost
         Cost of the solution.
     stable_cycles
         Longest stable explicit wear step [cycles].
@@ -107,7 +107,7 @@ class FirstContact:
     pressure: Array
     touches_border: bool
     largest_residual: float
-    spent: Spent
+    cost: Cost
     stable_cycles: float
     link: StructureLink
     cycle: tuple[ContactState, ...]
@@ -143,7 +143,8 @@ class InterfaceContact:
     >>> import numpy as np
     >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
     >>> from wear import *
-    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> grid, steel, law = Grid.line_contact(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4,
+    ...     3000.0)
     >>> contact = InterfaceContact(InterfaceSettings(
     ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
     ...     pair=ElasticPair(steel, steel), laws=(law, law),
@@ -164,7 +165,7 @@ class InterfaceContact:
         self.grid, self.transfer, self.pair = settings.grid, settings.transfer, settings.pair
         self._contact = NormalContact(HalfSpace(settings.grid, settings.pair))
         self._frictional: FrictionalContact | None = None
-        self._spent = self._reported = Spent()
+        self._spent = self._reported = Cost()
         self._current: tuple[tuple[Array, ...], _Loaded] | None = None
         # Progress callback, called after each increment of a half-space cycle with friction.
         self.solved: Callable[[], None] = lambda: None
@@ -211,18 +212,18 @@ class InterfaceContact:
             pressure=pressure,
             touches_border=any(s.touches_border for s in states),
             largest_residual=max((s.residuals.largest for s in states), default=0.0),
-            spent=self._newly_spent() + Spent(len(states), result.convolutions),
+            cost=self._new_cost() + Cost(len(states), result.convolutions),
             stable_cycles=loaded.contact.stable_cycles(state),
             link=state.link,
             cycle=loaded.cycle,
         )
 
-    def follow(self, state: InterfaceState, history: FaceLoads) -> tuple[InterfaceState, Spent]:
+    def follow(self, state: InterfaceState, history: FaceLoads) -> tuple[InterfaceState, Cost]:
         """Return the state under the loads of a new solution, and the cost.
 
         Raise :class:`MotionError` as :meth:`begin` does.
         """
-        return self._followed(state, history, self._link(history)), self._newly_spent()
+        return self._followed(state, history, self._link(history)), self._new_cost()
 
     def _followed(
         self, state: InterfaceState, history: FaceLoads, link: StructureLink
@@ -245,11 +246,11 @@ class InterfaceContact:
 
     def jump(
         self, state: InterfaceState, cycles: float, left: float
-    ) -> tuple[InterfaceState, Spent]:
+    ) -> tuple[InterfaceState, Cost]:
         """Wear ``cycles`` of the ``left`` cycles of the run, and return the state and the cost."""
         result = advance_cycles(self.settings.stepper, state, cycles, left, self.wearing)
         assert isinstance(result.state, InterfaceState)
-        return result.state, result.spent + self._newly_spent()
+        return result.state, result.cost + self._new_cost()
 
     def stable_cycles(self, state: InterfaceState) -> float:
         """Return the longest stable explicit step [cycles]."""
@@ -338,10 +339,10 @@ class InterfaceContact:
             )
         return self._frictional
 
-    def _newly_spent(self) -> Spent:
+    def _new_cost(self) -> Cost:
         """Return the cost of half-space cycles and links since the last call."""
-        spent, self._reported = self._spent - self._reported, self._spent
-        return spent
+        cost, self._reported = self._spent - self._reported, self._spent
+        return cost
 
     # -- loads -------------------------------------------------------------------------------------
     def _link(self, history: FaceLoads) -> StructureLink:
@@ -352,7 +353,7 @@ class InterfaceContact:
         half_space, shear = self._contact.half_space, settings.method == "full"
         before = half_space.count
         link = linked(half_space, self.transfer, history.loads, force, displacement, shear)
-        self._spent += Spent(0, half_space.count - before)
+        self._spent += Cost(0, half_space.count - before)
         return link.level() if settings.drive.tilt == "free" else link
 
     def wearing(self, state: WearState) -> WearingContact:
@@ -409,7 +410,7 @@ class InterfaceContact:
         known = state.start if isinstance(state.start, CycleStart) else None
         drive, starts = self.settings.drive, starts_near(known, state.starts, len(state.loads))
         cycle = tuple(march_cycle(contact, gaps, state.loads, drive, moved, starts, self.solved))
-        self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
+        self._spent += Cost(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
 
     def _paths(

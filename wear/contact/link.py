@@ -245,7 +245,7 @@ def _fit(
     return StructureLink(coefficients, region, quality)
 
 
-def fitted_alike(link: StructureLink, face: Transfer, nodal: Array) -> StructureLink:
+def fitted_like(link: StructureLink, face: Transfer, nodal: Array) -> StructureLink:
     """Fit fields with ``nodal`` values ``(t, 3, n)`` as the given ``link`` was fitted.
 
     The fit has the degrees and the region of that link, and no quality.

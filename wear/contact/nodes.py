@@ -15,7 +15,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.laws import SlidingConditions, WearLaw
-from wear.worn import Spent, WearStep, WornState
+from wear.worn import Cost, WearStep, WornState
 
 
 class NodalCycle(Protocol):
@@ -120,7 +120,7 @@ class NodalContact:
         """Wear ``cycles`` cycles at the present pressures and slips."""
         after = self.worn(state, cycles * self.rates(state, cycles), cycles)
         # The step cost one solved cycle: the other cycle of a mean is counted by its own step.
-        return WearStep(after, cycles, Spent(1, 0, 1))
+        return WearStep(after, cycles, Cost(1, 0, 1))
 
     def _per_pressure(
         self, cycle: NodalCycle, state: NodalState, cycles: float

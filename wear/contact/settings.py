@@ -63,7 +63,8 @@ class InterfaceSettings:
 
     >>> from sa_solver import ElasticPair, Grid, Material
     >>> from wear import ArchardLaw, CellNodes, ImplicitStepper, InterfaceSettings
-    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> grid, steel, law = Grid.line_contact(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4,
+    ...     3000.0)
     >>> settings = InterfaceSettings(
     ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
     ...     pair=ElasticPair(steel, steel), laws=(law, law),

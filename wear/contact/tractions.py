@@ -79,7 +79,7 @@ class CycleTractions:
         return np.asarray(np.sum(self.loads.share[:, None, None] * self.work, axis=0))
 
     @property
-    def increments_left(self) -> tuple[Array, Array] | None:
+    def work_and_error(self) -> tuple[Array, Array] | None:
         """Friction work per area of a cycle, and its error due to the increments.
 
         Each is ``(nx, ny)`` [N/mm]. It is None without friction work, or if the error is unknown.
@@ -98,7 +98,7 @@ def increments_error(cycles: Iterable[CycleTractions]) -> dict[str, float] | Non
     of all cycles together: errors that change sign from cycle to cycle cancel, as they do in wear.
     Return None without friction work, or if the errors are unknown.
     """
-    known = [left for left in (cycle.increments_left for cycle in cycles) if left is not None]
+    known = [left for left in (cycle.work_and_error for cycle in cycles) if left is not None]
     if not known:
         return None
     rubbed, errors = (np.sum(fields, axis=0) for fields in zip(*known, strict=True))

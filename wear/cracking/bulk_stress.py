@@ -34,7 +34,7 @@ import numpy as np
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.half_space.subsurface_influence import XX, XY, YY, YZ, ZX
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.contact.link import StructureLink, fitted_alike, linked
+from wear.contact.link import StructureLink, fitted_like, linked
 from wear.contact.transfer import Transfer
 
 RIGID = Material(np.inf, 0.0)
@@ -174,5 +174,5 @@ class BodyFace:
         if expansion is None:
             return BulkStress(rest, self.material, self.body)
         nodal = np.pad(expansion, ((0, 0), (0, 1), (0, 0)))
-        thermal = fitted_alike(rest, self.face, nodal)
+        thermal = fitted_like(rest, self.face, nodal)
         return BulkStress(rest, self.material, self.body, thermal)

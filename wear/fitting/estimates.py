@@ -46,7 +46,7 @@ class Estimate:
     deviation, bounds
         Standard deviation and 95 % bounds, NaN if the parameter is not determined. The deviation of
         a logarithmic parameter is its value times that of the logarithm.
-    doubt
+    caveat
         Reason why the parameter is not determined, empty if it is.
     shares
         Shares of the series in the variance ``(k,)``, which add up to 1.
@@ -75,7 +75,7 @@ class Estimate:
     ...     starts=[np.array([0.5, 50.0])],
     ... )
     >>> friction, load = fit(force).estimates
-    >>> print(friction.determined, "-", friction.doubt)
+    >>> print(friction.determined, "-", friction.caveat)
     False - only its product with load counts
     """
 
@@ -83,7 +83,7 @@ class Estimate:
     value: float
     deviation: float
     bounds: tuple[float, float]
-    doubt: str
+    caveat: str
     shares: Array
     heaviest: int
     heaviest_share: float
@@ -95,7 +95,7 @@ class Estimate:
     @property
     def determined(self) -> bool:
         """True if the data determine the parameter."""
-        return not self.doubt
+        return not self.caveat
 
 
 def inverse_of(jacobian: Array) -> tuple[Array, Array]:
@@ -150,10 +150,10 @@ def estimate_at(
         bounds, deviation = (value / factor, value * factor), value * deviation
     else:
         bounds = value - quantile * deviation, value + quantile * deviation
-    doubt = _why_undetermined(problem, place, values, kernel, held, jacobian)
-    if not doubt:
-        doubt = why_too_wide(unknown, value, bounds)
-    if doubt:
+    caveat = _why_undetermined(problem, place, values, kernel, held, jacobian)
+    if not caveat:
+        caveat = why_too_wide(unknown, value, bounds)
+    if caveat:
         deviation, bounds = np.nan, (np.nan, np.nan)
     heaviest = int(np.argmax(terms))
     partners = _partners(problem, place, values, jacobian)
@@ -163,7 +163,7 @@ def estimate_at(
         value=value,
         deviation=deviation,
         bounds=bounds,
-        doubt=doubt,
+        caveat=caveat,
         shares=shares / total if total > 0.0 else shares,
         heaviest=heaviest,
         heaviest_share=float(terms[heaviest]) / total if total > 0.0 else 0.0,
@@ -194,8 +194,8 @@ def checked_for_ties(alone: Sequence[Estimate], place: int, covariance: Array) -
     for k, other in enumerate(alone):
         tied = abs(covariance[place, k]) > FOLLOWS * spread[place] * spread[k]
         if estimate.determined and not other.determined and tied:
-            doubt = f"goes with {other.name}, which is not determined"
-            return replace(estimate, deviation=np.nan, bounds=(np.nan, np.nan), doubt=doubt)
+            caveat = f"goes with {other.name}, which is not determined"
+            return replace(estimate, deviation=np.nan, bounds=(np.nan, np.nan), caveat=caveat)
     return estimate
 
 

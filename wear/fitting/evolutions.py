@@ -21,7 +21,7 @@ from wear.fitting.problem import (
     FitProblem,
     Series,
     Unknown,
-    require_unlike,
+    require_distinct_names,
     settle_columns,
 )
 from wear.joints.evolution import (
@@ -291,7 +291,7 @@ def evolution_problem(data: Sequence[EvolutionData], shared: Sequence[str] = ())
     """
     for one in data:
         _check(one)
-    require_unlike([one.name for one in data])
+    require_distinct_names([one.name for one in data])
     names, unknowns = _unknowns(data, shared)
     series = tuple(Series(one.name, one.values, one.deviations) for one in data)
 

@@ -177,7 +177,7 @@ def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> Loo
     """
     if checks.whole("most", most, FitError) < 1:
         raise FitError(f"{most} loops at most; allowed: 1 or more")
-    measured.require_alike()
+    measured.require_one_step()
     record, count = measured.record, len(measured.branches)
     places = np.linspace(0, count - 1, min(count, most)).round().astype(int)
     pairs = [sorted(measured.branches[place], key=lambda one: one.sense) for place in places]

@@ -44,7 +44,7 @@ def column(
     return checks.array(what, values, (length,), error=FitError, finite=finite)
 
 
-def require_unlike(names: Sequence[str]) -> None:
+def require_distinct_names(names: Sequence[str]) -> None:
     """Raise :class:`FitError` for no data, or for two that have one name."""
     if not names or len(set(names)) < len(names):
         raise FitError(f"data named {', '.join(names) or 'nothing'}; allowed: a name for each")

@@ -99,9 +99,9 @@ def _with_bounds(
     """Return the estimate with other bounds, marked as undetermined if they are too wide."""
     if bounds == estimate.bounds:
         return estimate
-    doubt = why_too_wide(problem.unknowns[place], estimate.value, bounds)
-    if doubt:
-        return replace(estimate, doubt=doubt, deviation=np.nan, bounds=(np.nan, np.nan))
+    caveat = why_too_wide(problem.unknowns[place], estimate.value, bounds)
+    if caveat:
+        return replace(estimate, caveat=caveat, deviation=np.nan, bounds=(np.nan, np.nan))
     return replace(estimate, bounds=bounds, straight=False)
 
 
@@ -119,8 +119,8 @@ def _widened(
         if least >= lower - room and most <= upper + room:
             continue
         if not other.determined:
-            doubt = f"goes with {other.name}, which is not determined"
-            return replace(estimate, doubt=doubt, deviation=np.nan, bounds=(np.nan, np.nan))
+            caveat = f"goes with {other.name}, which is not determined"
+            return replace(estimate, caveat=caveat, deviation=np.nan, bounds=(np.nan, np.nan))
         estimate = _with_bounds(problem, place, estimate, (min(lower, least), max(upper, most)))
     return estimate
 

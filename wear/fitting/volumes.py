@@ -22,7 +22,7 @@ from wear.fitting.problem import (
     FitProblem,
     Series,
     Unknown,
-    require_unlike,
+    require_distinct_names,
     settle_columns,
 )
 
@@ -189,7 +189,7 @@ def volume_problem(data: Sequence[VolumeData], law: VolumeLaw) -> VolumeFit:
     """
     for one in data:
         _check(one, law)
-    require_unlike([one.name for one in data])
+    require_distinct_names([one.name for one in data])
     names: dict[tuple[str, str], int] = {}
     unknowns: list[Unknown] = []
     for one in data:

@@ -148,11 +148,11 @@ class TabulatedBoucWen(BoucWen):
     >>> from wear.joints.bouc_wen_curve import TabulatedBoucWen
     >>> given = dict(stiffness=1e4, friction=0.5, normal_load=100.0, exponent=3.0)
     >>> places = np.linspace(0.0, 0.02, 100)[:, None]
-    >>> at_once, alone = [
+    >>> run_parallel, alone = [
     ...     law.respond(law.rest(100), places).force
     ...     for law in (TabulatedBoucWen(**given), BoucWen(**given))
     ... ]
-    >>> bool(np.abs(at_once - alone).max() < 4e-9 * 50.0)
+    >>> bool(np.abs(run_parallel - alone).max() < 4e-9 * 50.0)
     True
     """
 

@@ -8,7 +8,7 @@ from typing import Generic
 
 import numpy as np
 
-from wear.worn import Spent, State, WearStep
+from wear.worn import Cost, State, WearStep
 
 SHORTEST = 0.01
 """Length, over the explicit limit, below which a step is not repeated: its error then has another
@@ -32,12 +32,12 @@ class Trial(Generic[State]):
 
 def accepted_step(attempt: Callable[[float], Trial[State]], cycles: float) -> WearStep[State]:
     """Repeat a step until its error fits, starting with ``cycles``, and add up the cost."""
-    spent = Spent()
+    cost = Cost()
     while True:
         trial = attempt(cycles)
-        spent += trial.step.spent
+        cost += trial.step.cost
         if trial.fits or cycles <= trial.shortest:
-            return replace(trial.step, spent=replace(spent, steps=trial.step.spent.steps))
+            return replace(trial.step, cost=replace(cost, steps=trial.step.cost.steps))
         cycles = max(trial.shorter, trial.shortest)
 
 

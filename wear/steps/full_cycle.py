@@ -150,7 +150,7 @@ def _closed_cycle(
     """Return the states of one closed cycle, whose first increment has the number ``first``."""
     # Bodies that are apart at the end are apart at the beginning, with the same surface motion.
     last, apart = loads[-1], _lifted(loads[-1])
-    state = contact.apart(heights[-1], last.along)
+    state = contact.unloaded_state(heights[-1], last.along)
     if apart:
         state = _apart(contact, heights[-1], last)
     change, limit = np.inf, 0.0
@@ -188,7 +188,7 @@ def _apart(contact: FrictionalContact, height: Array, load: ContactLoad) -> Cont
     The bodies may then meet elsewhere.
     """
     rigid = np.where(load.motion, load.values, 0.0)
-    return replace(contact.apart(height, load.along), rigid=rigid, strain=load.strain)
+    return replace(contact.unloaded_state(height, load.along), rigid=rigid, strain=load.strain)
 
 
 def _advance(

@@ -28,7 +28,7 @@ from wear.steps.step_errors import (
 )
 from wear.steps.steppers import ROUNDING, ComparingStepper, in_pairs
 from wear.steps.stepping import WearingContact, WearState
-from wear.worn import Spent, WearStep
+from wear.worn import Cost, WearStep
 
 ContactAt = Callable[[WearState], WearingContact]
 
@@ -99,36 +99,38 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
         at: ContactAt,
         last: bool,
     ) -> WearStep[WearState]:
-        contact, companion_contact = contacts
-        companion = state.companion
+        contact, contact_of_coarse_run = contacts
+        coarse_run = state.coarse_run
         if _forward_only(contact, state):
             if state.half_way:
                 # The half done is a complete step in forward order: continue from its state.
-                state = replace(state, coarse=replace(companion, coarse=None))
+                state = replace(state, coarse=replace(coarse_run, coarse=None))
             return super()._compared(state, cycles, contacts, at, last)
         if self.alone:
             return _strang_step(state, cycles, contact, at)[0]
         length = cycles
-        if last and companion.coarse is None:
+        if last and coarse_run.coarse is None:
             length = 0.5 * cycles
             begun, middle = _strang_step(state, length, contact, at)
             done, _ = _strang_step(begun.state, length, at(begun.state), at)
-            whole, _ = _strang_step(companion, cycles, contact, at)
-            done = replace(done, spent=begun.spent + done.spent)
+            whole, _ = _strang_step(coarse_run, cycles, contact, at)
+            done = replace(done, cost=begun.cost + done.cost)
         else:
             done, middle = _strang_step(state, cycles, contact, at)
-            if companion.coarse is None:
-                whole = _first_half(companion, cycles, contact, begun=state)
+            if coarse_run.coarse is None:
+                whole = _first_half(coarse_run, cycles, contact, begun=state)
             else:
-                half_way = companion_contact()
-                whole = _second_half(companion, cycles, half_way, at, half_way is not contact, last)
+                half_way = contact_of_coarse_run()
+                whole = _second_half(
+                    coarse_run, cycles, half_way, at, half_way is not contact, last
+                )
         follows = middle is not contact
         order = FOLLOWING_ORDER if follows else 1.0
         if whole.state.coarse is None:
             order = _apparent_order(length, contact.comparable_cycles(state), follows)
         after = replace(done.state, order=order, coarse=whole.state)
-        spent = replace(done.spent + whole.spent, steps=done.spent.steps)
-        return WearStep(after, cycles, spent)
+        cost = replace(done.cost + whole.cost, steps=done.cost.steps)
+        return WearStep(after, cycles, cost)
 
     def _assess(
         self,
@@ -141,19 +143,19 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
         before, after = ends
         if _forward_only(contact, before):
             return super()._assess(contact, control, ends, cycles, left)
-        to_go, begun = steps_to_come(before, after, cycles, left), before.companion.coarse
+        to_go, begun = steps_to_come(before, after, cycles, left), before.coarse_run.coarse
         if after.half_way:
             room = _error_margin_half_way(control, before, after, to_go)
             if room < 1.0:
                 return False, SAFETY * room
-            return True, after.companion.next_cycles / cycles
+            return True, after.coarse_run.next_cycles / cycles
         room = _error_margin(control, before, after, to_go)
         change = (SAFETY * room) ** (1.0 / STRANG_ORDER)
         if begun is None:
             return room >= 1.0, change
         # The two steps that make up the companion's step are not repeated.
         least = 1.0 if _error_fell(begun, after) else PAIRED_SHRINKAGE
-        whole = before.companion.next_cycles + cycles
+        whole = before.coarse_run.next_cycles + cycles
         return True, 0.5 * whole / cycles * min(max(change, least), PAIRED_GROWTH)
 
 
@@ -235,23 +237,23 @@ def _strang_step(
     """
     half = 0.5 * cycles
     out = contact.implicit_step(state, half, back=True)
-    middle, spent = at(out.state), out.spent
+    middle, cost = at(out.state), out.cost
     if middle is not contact:
         out = middle.implicit_step(replace(state, starts=out.state.starts), half, back=True)
-        spent += out.spent
+        cost += out.cost
     back = middle.implicit_step(out.state, half)
-    return WearStep(back.state, cycles, replace(spent + back.spent, steps=2)), middle
+    return WearStep(back.state, cycles, replace(cost + back.cost, steps=2)), middle
 
 
 def _first_half(
-    companion: WearState, cycles: float, contact: WearingContact, begun: WearState
+    coarse_run: WearState, cycles: float, contact: WearingContact, begun: WearState
 ) -> WearStep[WearState]:
     """Take the first half of a step of the companion, over ``cycles``.
 
     The result stores in ``coarse`` the state from which both have ``begun``, with its companion,
     and in ``next_cycles`` its own length.
     """
-    out = contact.implicit_step(companion, cycles, back=True)
+    out = contact.implicit_step(coarse_run, cycles, back=True)
     from_there = replace(begun, starts={})
     if begun.coarse is not None:
         from_there = replace(from_there, coarse=replace(begun.coarse, starts={}))
@@ -259,7 +261,7 @@ def _first_half(
 
 
 def _second_half(
-    companion: WearState,
+    coarse_run: WearState,
     cycles: float,
     contact: WearingContact,
     at: ContactAt,
@@ -271,19 +273,19 @@ def _second_half(
     The first half is repeated with the slips found there if these follow from wear, and with
     another length if both halves were unequal.
     """
-    both, gone = companion.coarse, companion.next_cycles
+    both, gone = coarse_run.coarse, coarse_run.next_cycles
     assert both is not None
-    begun = replace(both.companion, starts=companion.starts, coarse=None)
+    begun = replace(both.coarse_run, starts=coarse_run.starts, coarse=None)
     if cycles < SHORT_STEP * gone and not last:
         return _first_half(begun, gone + cycles, contact, both)
-    unequal, half, spent = abs(cycles - gone) > ROUNDING * gone, 0.5 * (gone + cycles), Spent()
+    unequal, half, cost = abs(cycles - gone) > ROUNDING * gone, 0.5 * (gone + cycles), Cost()
     if unequal and follows:
         return _strang_step(begun, gone + cycles, at(begun), at)[0]
     if unequal or follows:
         out = contact.implicit_step(begun, half, back=True)
-        companion, spent = out.state, out.spent
-    back = contact.implicit_step(replace(companion, coarse=None), half)
-    return replace(back, spent=spent + back.spent)
+        coarse_run, cost = out.state, out.cost
+    back = contact.implicit_step(replace(coarse_run, coarse=None), half)
+    return replace(back, cost=cost + back.cost)
 
 
 @dataclass(frozen=True)
@@ -321,4 +323,4 @@ def _second_order(
     if following is contact:
         return step
     predicted, step = step, contact.midway(following).second_order_step(state, cycles)
-    return replace(step, spent=predicted.spent + step.spent)
+    return replace(step, cost=predicted.cost + step.cost)

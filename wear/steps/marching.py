@@ -8,7 +8,7 @@ from typing import Generic
 
 from sa_solver.steps import COMPUTED, Steps
 from wear.steps.steppers import ROUNDING, Contact, Stepper
-from wear.worn import Spent, State, WearStep
+from wear.worn import Cost, State, WearStep
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def advance_cycles(
             return None
         step = stepper.step(worn.state, most, left - worn.cycles, contact_at)
         reached(worn.cycles + step.cycles)
-        return WearStep(step.state, worn.cycles + step.cycles, worn.spent + step.spent)
+        return WearStep(step.state, worn.cycles + step.cycles, worn.cost + step.cost)
 
-    worn = marched_by.march("wear step", WearStep(state, 0.0, Spent()), further)
+    worn = marched_by.march("wear step", WearStep(state, 0.0, Cost()), further)
     return replace(worn, cycles=cycles)

@@ -20,7 +20,7 @@ from numpy.polynomial.chebyshev import chebder, chebval
 from sa_solver.types import Array
 from wear.contact.nodes import NodalContact, NodalState
 from wear.steps.steppers import ComparingStepper
-from wear.worn import Spent, WearStep
+from wear.worn import Cost, WearStep
 
 DAMPING = 2.0 / 13.0
 """Damping ε: beyond 2 % of the stable length, a step leaves at most 1 - ε/3 of stiff waves."""
@@ -46,7 +46,7 @@ class StabilisedStepper(ComparingStepper[NodalState, NodalContact]):
         # Explicit Euler is stable up to 2/λ.
         stages = stages_for(2.0 * MARGIN * cycles / contact.stable_cycles(state))
         lost = chebyshev_step(rate, contact.rates(state), cycles, stages)
-        return WearStep(contact.worn(state, lost, cycles), cycles, Spent(stages, 0, 1))
+        return WearStep(contact.worn(state, lost, cycles), cycles, Cost(stages, 0, 1))
 
     def _order(self, contact: NodalContact) -> float:
         return 2.0

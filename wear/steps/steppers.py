@@ -103,7 +103,8 @@ class ExplicitStepper:
     >>> import numpy as np
     >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
     >>> from wear import *
-    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> grid, steel, law = Grid.line_contact(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4,
+    ...     3000.0)
     >>> contact = InterfaceContact(InterfaceSettings(
     ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
     ...     pair=ElasticPair(steel, steel), laws=(law, law),
@@ -118,7 +119,7 @@ class ExplicitStepper:
     >>> *_, end = loop.march(unworn)
     >>> print(f"{end.volume:.2e} mm^3/mm of {1e4 * 2 * 1e-4 * 0.04 * 50.0 / 3000.0:.2e}")
     1.33e-03 mm^3/mm of 1.33e-03
-    >>> print(end.spent.steps, "steps")
+    >>> print(end.cost.steps, "steps")
     120 steps
     """
 
@@ -195,8 +196,8 @@ class HeunStepper:
         left: float,
         contact_at: Callable[[State], AveragedContact[State]],
     ) -> WearStep[State]:
-        contact, companion = contact_at(state), state.companion
-        companion_contact = contact if companion is state else contact_at(companion)
+        contact, coarse_run = contact_at(state), state.coarse_run
+        contact_of_coarse_run = contact if coarse_run is state else contact_at(coarse_run)
         first = 2.0 * _stable(contact, state, 0.5 * min(most, state.next_cycles), self.share)
 
         def trial(cycles: float) -> Trial[State]:
@@ -205,7 +206,7 @@ class HeunStepper:
             done, error_2, end_2 = _heun_step(
                 begun.state, half, contact_at(begun.state), contact_at
             )
-            whole, _, _ = _heun_step(companion, cycles, companion_contact, contact_at)
+            whole, _, _ = _heun_step(coarse_run, cycles, contact_of_coarse_run, contact_at)
             error, change = max(error_1, error_2), GROWTH
             if error > 0.0:
                 change = float(np.clip(SAFETY * self.tolerance / error, SHRINKAGE, GROWTH))
@@ -214,10 +215,10 @@ class HeunStepper:
                 # The end or the stability limit has shortened the step, not its error.
                 further = max(further, state.next_cycles)
             after = replace(done.state, next_cycles=further, coarse=whole.state, order=2.0)
-            spent = replace(begun.spent + done.spent + whole.spent, steps=2)
+            cost = replace(begun.cost + done.cost + whole.cost, steps=2)
             shortest = shortest_step(self.share * min(contact.stable_cycles(state), end_1, end_2))
             return Trial(
-                WearStep(after, cycles, spent),
+                WearStep(after, cycles, cost),
                 fits=error <= self.tolerance,
                 shorter=cycles * change,
                 shortest=2.0 * shortest,
@@ -240,8 +241,8 @@ def _heun_step(
     missed = step.state.surfaces.depth - predicted.state.surfaces.depth
     size = root_mean_square(worn, worn)
     error = root_mean_square(missed, worn) / size if size > 0.0 else 0.0
-    spent = predicted.spent + step.spent
-    return replace(step, spent=spent), error, following.stable_cycles(predicted.state)
+    cost = predicted.cost + step.cost
+    return replace(step, cost=cost), error, following.stable_cycles(predicted.state)
 
 
 def _stable(contact: ExplicitContact[State], state: State, most: float, fraction: float) -> float:
@@ -306,13 +307,13 @@ class ComparingStepper(ABC, Generic[State, Compared]):
         contact, control = contact_at(state), self.control
 
         @cache
-        def companion_contact() -> Compared:
-            companion = state.companion
-            return contact if companion is state else contact_at(companion)
+        def contact_of_coarse_run() -> Compared:
+            coarse_run = state.coarse_run
+            return contact if coarse_run is state else contact_at(coarse_run)
 
         def trial(cycles: float) -> Trial[State]:
             last = cycles >= left * (1.0 - ROUNDING)
-            step = self._compared(state, cycles, (contact, companion_contact), contact_at, last)
+            step = self._compared(state, cycles, (contact, contact_of_coarse_run), contact_at, last)
             after = step.state
             shortest = 2.0 * shortest_step(
                 min(contact.stable_cycles(end) for end in (state, after))
@@ -342,15 +343,15 @@ class ComparingStepper(ABC, Generic[State, Compared]):
 
         ``contacts`` are the contact of the state and a function that returns that of its companion.
         """
-        half, (contact, companion_contact) = 0.5 * cycles, contacts
+        half, (contact, contact_of_coarse_run) = 0.5 * cycles, contacts
         first = self._advance(state, half, contact, at, last)
         second = self._advance(first.state, half, at(first.state), at, last)
-        after, spent = second.state, first.spent + second.spent
+        after, cost = second.state, first.cost + second.cost
         if not self.alone:
-            whole = self._advance(state.companion, cycles, companion_contact(), at, last)
-            after, spent = replace(after, coarse=whole.state), spent + whole.spent
+            whole = self._advance(state.coarse_run, cycles, contact_of_coarse_run(), at, last)
+            after, cost = replace(after, coarse=whole.state), cost + whole.cost
         after = replace(after, order=self._order(contact))
-        return WearStep(after, cycles, replace(spent, steps=2))
+        return WearStep(after, cycles, replace(cost, steps=2))
 
     def _assess(
         self,

@@ -41,7 +41,7 @@ from wear.contact.drive import Drive
 from wear.contact.moving import Passage, TravelError
 from wear.laws import SlidingConditions, WearLaw
 from wear.surfaces import Surfaces
-from wear.worn import Spent, WearStep, WornState
+from wear.worn import Cost, WearStep, WornState
 
 GAMMA = 1.0 - np.sqrt(0.5)
 """Weight of the second stage of Alexander's method, and the length of each stage over the step."""
@@ -386,7 +386,7 @@ class _March:
         self._contact, self._before, self._cycles = contact, state, cycles
         self._starts = dict(state.starts)
         self._per_pressure = contact.depth_per_pressure(state, cycles)
-        self._spent = Spent(steps=1)
+        self._spent = Cost(steps=1)
 
     def solve(self, increment: int, cycles: float) -> NormalState:
         """Return the contact state whose wear over ``cycles`` is part of its gap."""
@@ -400,7 +400,7 @@ class _March:
     def wear(self, increment: int, state: NormalState, cycles: float) -> None:
         """Let an increment wear ``cycles`` times at the pressure of ``state``."""
         self._starts[increment] = state.start
-        self._spent += Spent(1, state.convolutions)
+        self._spent += Cost(1, state.convolutions)
         self.surfaces = self._contact._worn(
             self.surfaces, increment, state.pressure * cycles, self._per_pressure
         )

@@ -235,7 +235,7 @@ class OrAuto:
 
 
 @dataclass(frozen=True)
-class OrAlone:
+class ScalarOrList:
     """Annotation of a list whose first value may be given alone; ``rest`` then follows it."""
 
     rest: tuple[int, ...] = ()

@@ -29,10 +29,10 @@ from workflow.case.fields import (
     Entry,
     File,
     Formats,
-    OrAlone,
     Path,
     Quantity,
     Rows,
+    ScalarOrList,
     Text,
     Whole,
     shown,
@@ -51,8 +51,8 @@ Stress = Annotated[
 GridCells = Annotated[int, Whole(8, 4096)]
 # Cells along x and y: of a contact that may be a line contact, and of a line contact. One number
 # alone means a line contact.
-FaceCells = Annotated[tuple[GridCells, Annotated[int, Rows(8, 4096)]], OrAlone((1,))]
-LineCells = Annotated[tuple[GridCells, Annotated[int, Whole(1, 1)]], OrAlone((1,))]
+FaceCells = Annotated[tuple[GridCells, Annotated[int, Rows(8, 4096)]], ScalarOrList((1,))]
+LineCells = Annotated[tuple[GridCells, Annotated[int, Whole(1, 1)]], ScalarOrList((1,))]
 # Formats of figures; the first is the default.
 FIGURE_FORMATS = "png", "svg", "pdf"
 Title = Annotated[str, Text()]
@@ -351,11 +351,11 @@ class Case(Section, ABC):
     def outline(self) -> list[tuple[str, str]]:
         """Return what would run, in a few rows of name and text."""
 
-    def doubts(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[str]:
         """Yield a warning for each combination of entries that is possible but implausible.
 
         Each line begins with one of the entries. Warnings about single entries are in
-        :mod:`workflow.case.doubts`.
+        :mod:`workflow.case.plausibility`.
         """
         yield from ()
 

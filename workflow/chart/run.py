@@ -34,8 +34,8 @@ from workflow.errors import MethodFailed, UserError
 from workflow.kinds import analysis_of, load_case
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
-from workflow.runs.run import kept_in
-from workflow.shell.folders.cache import kept_files
+from workflow.runs.run import stored_run
+from workflow.shell.folders.cache import cache_files
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.summary import number_at
 from workflow.shell.processes import environment
@@ -143,9 +143,9 @@ def _claim(folder: OutputFolder, case: Case) -> None:
     """Prepare the folder; raise UserError if it contains anything but a chart."""
     folder.refuse_foreign()
     structures = folder.reserve(STRUCTURES, "what runs of the same structure share")
-    if kept_in(folder.root / RUNS / BASELINE, case) != "finished":
+    if stored_run(folder.root / RUNS / BASELINE, case) != "finished":
         # The case as written runs first, and must compute its structure itself to measure its cost.
-        for path in [] if structures.is_symlink() else kept_files(structures):
+        for path in [] if structures.is_symlink() else cache_files(structures):
             path.unlink()
 
 

@@ -62,8 +62,8 @@ def _draw_step(axis: Axes, loops: MeasuredLoops, members: Indices, labelled: boo
     label = "middle loop of a step" if several else f"cycle {middle + 1}"
     axis.plot(*_curve(loops, *pair), color=BLACK, lw=1.2, label=label if labelled else None)
     for number, branch in enumerate(pair):
-        told = labelled and number == 0
-        _draw_stick(axis, loops, middle, branch, "stick slope kt" if told else None)
+        reported = labelled and number == 0
+        _draw_stick(axis, loops, middle, branch, "stick slope kt" if reported else None)
         if loops.sliding[middle] > 0.0:
             # Small strokes that stick have no such line: the first one drawn has the label.
             named = "sliding, slope kr"

@@ -14,7 +14,7 @@ import numpy as np
 
 from fe_models.geometry.imported import GIVEN, ImportedMesh, Patch, patch
 from fe_models.meshes.structure_mesh import Body
-from fe_models.readers.scene import SaidContact, SaidLoad, SaidSupport, Vector
+from fe_models.readers.scene import FileContact, FileLoad, FileSupport, Vector
 from sa_solver.types import Array
 
 TO_FILL = "fill in"
@@ -53,8 +53,8 @@ class _Offered:
         held = {self._owner(support.group) for support in self.supports}
         # Supported bodies come first, so that body 1 is supported.
         self.order = sorted(imported.bodies, key=lambda name: name not in held)
-        said = [pair for pair in self.scene.contacts if self._is_known(pair)]
-        self.contacts = [self._ordered(pair) for pair in said or self._facing()]
+        printed = [pair for pair in self.scene.contacts if self._is_known(pair)]
+        self.contacts = [self._ordered(pair) for pair in printed or self._facing()]
         meeting = {self._owner(face) for pair in self.contacts for face in pair.faces}
         self.bodies = [name for name in self.order if name in meeting] or self.order
         for name in self.order:
@@ -118,7 +118,7 @@ class _Offered:
             return patch(Body(name, body.mesh.with_boundaries({group: facets})), group)
         return None
 
-    def _is_known(self, pair: SaidContact) -> bool:
+    def _is_known(self, pair: FileContact) -> bool:
         """Return whether the faces are on two bodies; if not, note why the contact is ignored."""
         for face in pair.faces:
             if len(self._owners(face)) != 1 or self._patch(face) is None:
@@ -145,14 +145,14 @@ class _Offered:
 
     # --- supports and loads ---------------------------------------------------------------------
 
-    def _supports(self) -> Iterator[SaidSupport]:
+    def _supports(self) -> Iterator[FileSupport]:
         """Yield the supports, one per group, without the axes along which the group is moved."""
         moved = {
             (load.group, AXES[int(np.argmax(np.abs(load.value)))])
             for load in self.loads
             if load.kind == "displacement"
         }
-        together: dict[str, SaidSupport] = {}
+        together: dict[str, FileSupport] = {}
         for support in self.scene.supports:
             if not self._owners(support.group):
                 self.ignored.append(f"{support.line}: {support.group} is on no body")
@@ -163,7 +163,7 @@ class _Offered:
             together[support.group] = replace(before, axes="".join(sorted(axes)))
         return (support for support in together.values() if support.axes)
 
-    def _placed(self, load: SaidLoad) -> SaidLoad | None:
+    def _placed(self, load: FileLoad) -> FileLoad | None:
         """Return a load in the form of a case, a traction as a force; None if it has none."""
         if load.group and len(self._owners(load.group)) != 1:
             self.ignored.append(f"{load.line}: {load.group} is not on one body")
@@ -192,12 +192,12 @@ class _Offered:
 
     # --- contacts -------------------------------------------------------------------------------
 
-    def _ordered(self, pair: SaidContact) -> SaidContact:
+    def _ordered(self, pair: FileContact) -> FileContact:
         """Return the contact with its faces in the order of their bodies."""
         one, two = sorted(pair.faces, key=lambda face: self.order.index(self._owner(face)))
         return replace(pair, faces=(one, two))
 
-    def _facing(self) -> Iterator[SaidContact]:
+    def _facing(self) -> Iterator[FileContact]:
         """Yield pairs of boundaries of two bodies that touch, for a file that names no contacts."""
         places = {
             (name, boundary): patch(body, boundary)
@@ -215,7 +215,7 @@ class _Offered:
                 and abs(apart @ a.normal) < NEAR * size
                 and np.linalg.norm(apart) < reach
             ):
-                yield SaidContact((face_1, face_2), None, "by their places")
+                yield FileContact((face_1, face_2), None, "by their places")
 
     def _sliding(self, normal: Array) -> list[float]:
         """Return the sliding direction of body 2: along a load or motion, else along an axis."""
@@ -287,8 +287,8 @@ class _Offered:
             )
         values = {"young": TO_FILL, "poisson": TO_FILL}
         values |= {key: _number(value) for key, value in known.items()}
-        told = ", ".join(f"{key}: {value}" for key, value in values.items())
-        yield f"  {entry}: {{{told}}}"
+        reported = ", ".join(f"{key}: {value}" for key, value in values.items())
+        yield f"  {entry}: {{{reported}}}"
 
     @property
     def _forces(self) -> str:
@@ -317,7 +317,7 @@ class _Offered:
         yield f"  peak_leg: {self._steps}"
 
 
-def _value(load: SaidLoad) -> str:
+def _value(load: FileLoad) -> str:
     if isinstance(load.value, float):
         return f"pressure: {_number(load.value)}"
     if load.kind == "rotation":

@@ -117,28 +117,30 @@ def report(scar: Scar) -> list[str]:
         lines.append(
             f"{percent(scar.missing)} of the worn area are missing points, which are filled in"
         )
-    return [*lines, *_doubts(scar)]
+    return [*lines, *_warnings_about(scar)]
 
 
-def _doubts(scar: Scar) -> list[str]:
-    doubts = []
+def _warnings_about(scar: Scar) -> list[str]:
+    plausibility_warnings = []
     if (step := min(scar.pitch)) < NEAR:
-        doubts.append(f"warning: points {plain(step, 'mm', 3)} apart: is their unit right?")
+        plausibility_warnings.append(
+            f"warning: points {plain(step, 'mm', 3)} apart: is their unit right?"
+        )
     if scar.patches is None:
-        doubts.append(
+        plausibility_warnings.append(
             "warning: both scans agree around the worn area to the last digit, as no two "
             "measurements do, so the error is unknown: are they one file, damaged, or computed?"
         )
     elif not scar.sure:
-        doubts.append(
+        plausibility_warnings.append(
             "warning: the noise is correlated over so much of the rim that the errors are rough "
             "at best: take scans that reach farther"
         )
     if scar.volume <= (scar.volume_error or 0.0):
-        doubts.append(
+        plausibility_warnings.append(
             "warning: the volume does not differ from none: are the files in the right order?"
         )
-    return doubts
+    return plausibility_warnings
 
 
 # --- files --------------------------------------------------------------------------------------
@@ -173,8 +175,10 @@ def _table(scar: Scar) -> list[str]:
         "patches [1]": (scar.patches, None),
         "missing [1]": (scar.missing, None),
     }
-    told = [f"{name},{_cell(value, 10)},{_cell(bound, 6)}" for name, (value, bound) in rows.items()]
-    return ["quantity,value,bound 95 %", *told]
+    reported = [
+        f"{name},{_cell(value, 10)},{_cell(bound, 6)}" for name, (value, bound) in rows.items()
+    ]
+    return ["quantity,value,bound 95 %", *reported]
 
 
 def _cell(value: float | None, digits: int) -> str:

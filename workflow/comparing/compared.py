@@ -13,8 +13,8 @@ from workflow.case.text.leaves import leaves_of
 from workflow.case.text.readable import suited_unit
 from workflow.errors import UserError
 from workflow.kinds import analysis_of
-from workflow.report.told import ToldRun
-from workflow.report.writing import told_run
+from workflow.report.report_data import ReportData
+from workflow.report.writing import report_data_of
 from workflow.shell.analysis import Analysis
 from workflow.shell.output.quantities import SummaryQuantity
 from workflow.shell.output.summary import required_number
@@ -30,7 +30,7 @@ class ComparedRun:
 
     name: str
     folder: Path
-    run: ToldRun
+    run: ReportData
 
 
 @dataclass(frozen=True)
@@ -101,17 +101,17 @@ def compare(folders: Sequence[str | Path]) -> ComparedRuns:
     paths = [Path(folder) for folder in folders]
     if len({path.resolve() for path in paths}) < max(len(paths), 2):
         raise UserError("compare: two or more folders of finished runs are needed, each once")
-    told = [told_run(path, figures=False) for path in paths]
+    reported = [report_data_of(path, figures=False) for path in paths]
     names = _names(paths)
-    runs = tuple(map(ComparedRun, names, paths, told))
-    first, analysis = told[0], analysis_of(told[0].case)
+    runs = tuple(map(ComparedRun, names, paths, reported))
+    first, analysis = reported[0], analysis_of(reported[0].case)
     for run in runs[1:]:
         if analysis_of(run.run.case) is not analysis:
             raise UserError(
                 f"{run.folder}: a run of a {run.run.kind} case, but that in {paths[0]} is of a "
                 f"{first.kind} case; allowed: {', '.join(analysis.cases)}"
             )
-    return ComparedRuns(analysis, runs, _rows(analysis, told), _entries(told))
+    return ComparedRuns(analysis, runs, _rows(analysis, reported), _entries(reported))
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -123,7 +123,7 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [path.relative_to(above).as_posix() for path in whole]
 
 
-def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[ComparedQuantity, ...]:
+def _rows(analysis: Analysis[Any], runs: Sequence[ReportData]) -> tuple[ComparedQuantity, ...]:
     """Return quantities of all runs by group, name and unit, in the order of the first run.
 
     In a line contact and in one over an area, a name may have different units, and so two rows.
@@ -146,7 +146,7 @@ def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[ComparedQua
     return tuple(rows)
 
 
-def _entries(runs: Sequence[ToldRun]) -> dict[str, tuple[str, ...]]:
+def _entries(runs: Sequence[ReportData]) -> dict[str, tuple[str, ...]]:
     """Return the entries in which the cases differ, as text."""
     leaves = [{leaf.path: leaf for leaf in leaves_of(run.case)} for run in runs]
     paths = dict.fromkeys(path for of_run in leaves for path in of_run)

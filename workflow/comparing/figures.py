@@ -21,7 +21,7 @@ INCHES = 7.0, 4.6
 COLOURS = BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK
 STYLES = "-", "--", "-.", ":"
 # Ratio of the ranges of curves above which a logarithmic axis shows them.
-FAR_APART = 50.0
+MUCH_SMALLER = 50.0
 # More curves than this in a panel cannot be distinguished.
 MOST = len(COLOURS) * len(STYLES)
 
@@ -70,9 +70,9 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
             color=COLOURS[number % len(COLOURS)],
             label=name,
         )
-    if _far_apart([curve.x for curve in curves.values()]):
+    if _much_smaller([curve.x for curve in curves.values()]):
         axis.set_xscale("log", nonpositive="mask")
-    if first.logarithmic or _far_apart([curve.y for curve in curves.values()]):
+    if first.logarithmic or _much_smaller([curve.y for curve in curves.values()]):
         axis.set_yscale("log", nonpositive="mask")
     for line in (axis.xaxis, axis.yaxis):
         if line.get_scale() == "linear":
@@ -84,13 +84,13 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
     return figure
 
 
-def _far_apart(values: Sequence[Array]) -> bool:
+def _much_smaller(values: Sequence[Array]) -> bool:
     """Return whether some curves are too small to be seen on the same linear axis as others.
 
     A logarithmic axis is possible only if no value is negative.
     """
     reached = [_largest(those) for those in values]
-    seen = min(reached) * FAR_APART >= max(reached) or min(reached) == 0.0
+    seen = min(reached) * MUCH_SMALLER >= max(reached) or min(reached) == 0.0
     return not seen and all(np.nanmin(those) >= 0.0 for those in values)
 
 

@@ -192,5 +192,5 @@ def _cell(row: ComparedQuantity, number: int) -> object:
     alike = row.difference(number) == 0.0
     apart = "" if alike else " ".join(_apart(row, number))
     look = "bad" if row.beyond(number) else "error"
-    told = element("div", element("span", apart, cls=look)) if apart else Html("")
-    return element("div", value_of(replace(quantity, everyday=row.everyday), value), told)
+    reported = element("div", element("span", apart, cls=look)) if apart else Html("")
+    return element("div", value_of(replace(quantity, everyday=row.everyday), value), reported)

@@ -115,19 +115,19 @@ class FittedSeries:
 
 @dataclass(frozen=True)
 class Fitted:
-    """Result of a fit: the solution, parameters by their paths in a case, data, and ``doubts``.
+    """Result of a fit: solution, parameters by path in a case, data, ``plausibility_warnings``.
 
     ``tests`` has the estimates of each file for a parameter, by path, where there are several
-    tables. For a fit through runs, ``told`` and ``runs`` report their number and errors.
+    tables. For a fit through runs, ``reported`` and ``runs`` report their number and errors.
     """
 
     given: FitInput
     fit: Fit
     parameters: tuple[Parameter, ...]
     series: tuple[FittedSeries, ...]
-    doubts: tuple[str, ...]
+    plausibility_warnings: tuple[str, ...]
     tests: Mapping[str, Common]
-    told: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
     runs: Mapping[str, Any] = field(default_factory=dict)
 
     def shown_tests(self, path: str) -> list[tuple[str, float, float, float]]:
@@ -164,36 +164,46 @@ def solved(
     paths: Sequence[tuple[str, str]],
     series: Sequence[FittedSeries],
     notes: Sequence[str],
-    told: Sequence[str] = (),
+    reported: Sequence[str] = (),
 ) -> Fitted:
     """Return the result of a fit whose parameters have these ``paths`` and units."""
     called = {one.name: path for one, (path, _) in zip(fitted.estimates, paths, strict=True)}
     parameters = tuple(
-        Parameter(path, unit, replace(estimate, doubt=_in_paths(estimate.doubt, called)))
+        Parameter(path, unit, replace(estimate, caveat=_in_paths(estimate.caveat, called)))
         for (path, unit), estimate in zip(paths, fitted.estimates, strict=True)
     )
     order = np.concatenate([one.order for one in series])
     files = np.concatenate([one.column.files for one in series])
     places = [place for one in series for place in one.column.places]
-    doubts = list(notes)
-    for doubt in diagnose(fitted, order, files):
-        named = _named([places[k] for k in doubt.data])
+    plausibility_warnings = list(notes)
+    for caveat in diagnose(fitted, order, files):
+        named = _named([places[k] for k in caveat.data])
         where = f" ({named})" if named else ""
-        doubts.append(": ".join(part for part in (doubt.series, doubt.text + where) if part))
-    doubts += [
+        plausibility_warnings.append(
+            ": ".join(part for part in (caveat.series, caveat.text + where) if part)
+        )
+    plausibility_warnings += [
         f"{parameter.path}: rests on one value, {places[e.heaviest]}; more there would help"
         for parameter in parameters
         if (e := parameter.estimate).determined and e.heaviest_share > ALONE
     ]
-    doubts += _products(fitted, parameters)
+    plausibility_warnings += _products(fitted, parameters)
     if fitted.reached < fitted.tried:
-        doubts.append(
+        plausibility_warnings.append(
             f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit; the "
             "best one is reported"
         )
     tests = _tests(fitted, parameters, series, files)
-    found = Fitted(given, fitted, parameters, tuple(series), tuple(doubts), tests, tuple(told))
-    return replace(found, doubts=(*doubts, *_contradictions(found)))
+    found = Fitted(
+        given,
+        fitted,
+        parameters,
+        tuple(series),
+        tuple(plausibility_warnings),
+        tests,
+        tuple(reported),
+    )
+    return replace(found, plausibility_warnings=(*plausibility_warnings, *_contradictions(found)))
 
 
 def _tests(
@@ -214,7 +224,7 @@ def _tests(
 
 def _contradictions(fitted: Fitted) -> list[str]:
     """Return warnings about parameters on which the files do not agree."""
-    told = []
+    reported = []
     for path, common in fitted.tests.items():
         # One false alarm in a thousand fits, whatever the number of parameters.
         if common.chance < ALARM / len(fitted.tests):
@@ -224,12 +234,12 @@ def _contradictions(fitted: Fitted) -> list[str]:
                 for name, _, own, deviation in fitted.shown_tests(path)
                 if np.isfinite(own)
             )
-            told.append(
+            reported.append(
                 f"{path}: the files contradict each other beyond their scatter "
                 f"({values}{'' if unit == '1' else f' {unit}'}), so bounds of a common value are "
                 "too small: fit them separately, or ask what the tests differ in"
             )
-    return told
+    return reported
 
 
 def _named(places: Sequence[str]) -> str:
@@ -241,7 +251,7 @@ def _named(places: Sequence[str]) -> str:
 def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[str]:
     """Return the products of pairs of parameters that only matter as a product."""
     names = [parameter.estimate.name for parameter in parameters]
-    told = []
+    reported = []
     for place, parameter in enumerate(parameters):
         partner = parameter.estimate.partner
         if partner and names.index(partner) > place and not parameter.estimate.logarithmic:
@@ -249,8 +259,8 @@ def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[str]:
             value, deviation = map(other.shown, fitted.product(place, names.index(partner)))
             unit = "" if other.unit == "1" else f" {other.unit}"
             number = f"{parameter.shown(value):.5g}{unit} +- {parameter.shown(deviation):.2g}"
-            told.append(f"{parameter.path} times {other.path} is {number}; hold one of them")
-    return told
+            reported.append(f"{parameter.path} times {other.path} is {number}; hold one of them")
+    return reported
 
 
 def _in_paths(text: str, called: Mapping[str, str]) -> str:

@@ -28,7 +28,7 @@ def fit_loops(given: FitInput, file: LoopFitSection) -> Fitted:
     held = {key: float(value) for key, value in entries.items() if value != FREE}
     names = [_loop_name(file, number) for number in range(1, len(file.measurements) + 1)]
     loops: list[LoopData] = []
-    told, doubts = [], []
+    reported, plausibility_warnings = [], []
     for name, one in zip(names, file.measurements, strict=True):
         measured = _measured(one)
         steps = _fitted_steps(measured)
@@ -36,8 +36,10 @@ def fit_loops(given: FitInput, file: LoopFitSection) -> Fitted:
             loops += [loop_data(name, step, MOST_LOOPS // len(steps)) for step in steps]
         except MeasuredLoopError as error:
             raise UserError(f"{one.file}: {error}") from error
-        told.append(f"{Path(one.file).name}: {account(measured)}")
-        doubts += [f"{Path(one.file).name}: {text}" for text in _doubts(measured, len(steps))]
+        reported.append(f"{Path(one.file).name}: {account(measured)}")
+        plausibility_warnings += [
+            f"{Path(one.file).name}: {text}" for text in _warnings_about(measured, len(steps))
+        ]
     try:
         problem = loop_problem(loops, file.joint.law, held)
         fitted = fit(problem.problem)
@@ -54,7 +56,14 @@ def fit_loops(given: FitInput, file: LoopFitSection) -> Fitted:
         for number, (name, one) in enumerate(zip(names, file.measurements, strict=True))
     ]
     asked = [unknown for unknown in problem.problem.unknowns if not unknown.nuisance]
-    return solved(given, fitted, [_loop_path(one.name) for one in asked], series, doubts, told)
+    return solved(
+        given,
+        fitted,
+        [_loop_path(one.name) for one in asked],
+        series,
+        plausibility_warnings,
+        reported,
+    )
 
 
 def _measured(one: LoopMeasurement) -> MeasuredLoops:
@@ -75,11 +84,11 @@ def _fitted_steps(measured: MeasuredLoops) -> list[MeasuredLoops]:
     return [steps[place] for place in np.linspace(0, len(steps) - 1, count).round().astype(int)]
 
 
-def _doubts(measured: MeasuredLoops, fitted: int) -> list[str]:
+def _warnings_about(measured: MeasuredLoops, fitted: int) -> list[str]:
     """Return warnings about steps of a record that no single law can describe."""
-    steps, doubts = measured.steps, []
+    steps, plausibility_warnings = measured.steps, []
     if fitted < len(steps):
-        doubts.append(
+        plausibility_warnings.append(
             f"{fitted} of {len(steps)} steps of similar loops are fitted, from the first to "
             "the last"
         )
@@ -92,12 +101,12 @@ def _doubts(measured: MeasuredLoops, fitted: int) -> list[str]:
     if same.any():
         first = int(np.flatnonzero(same)[0])
         last = first + 1 + int(np.flatnonzero(same)[-1]) - first
-        doubts.append(
+        plausibility_warnings.append(
             f"loops of one stroke change, from {forces[first]:.4g} N and {energies[first]:.4g} mJ "
             f"to {forces[last]:.4g} N and {energies[last]:.4g} mJ: the joint wears or runs in, "
             "and one law is a mean of its states; fit parts of the record separately"
         )
-    return doubts
+    return plausibility_warnings
 
 
 def _loop_name(file: LoopFitSection, number: int) -> str:

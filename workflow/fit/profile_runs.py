@@ -122,8 +122,8 @@ class TestRuns:
         ]
         name = f"case_{self._numbers[test.case]}_{'_'.join(texts)}"
         if finer:
-            said = hashlib.sha256(repr(sorted(finer.items())).encode()).hexdigest()[:DIGITS]
-            name = f"{name}_finer_{said}"
+            printed = hashlib.sha256(repr(sorted(finer.items())).encode()).hexdigest()[:DIGITS]
+            name = f"{name}_finer_{printed}"
         return Job(name, Path(test.case), tuple(overrides))
 
     def _case(self, number: int, test: ProfileMeasurement) -> Any:
@@ -155,7 +155,7 @@ class TestRuns:
             )
         name = self._interface(number, interfaces(summary))
         x, *depths = middle_profiles(finished.folder, [name])[name]
-        if alike and not _wear_alike(depths, pair):
+        if alike and not _wear_in_proportion(depths, pair):
             raise UserError(
                 f"{self.place(number, 'case')}: the bodies do not wear in proportion to their "
                 "coefficients; allowed: a case of one law for both, in which they hardly move "
@@ -176,7 +176,7 @@ class TestRuns:
         return asked
 
 
-def _wear_alike(depths: Sequence[Array], pair: Pair) -> bool:
+def _wear_in_proportion(depths: Sequence[Array], pair: Pair) -> bool:
     """Return whether the depths of the bodies are in proportion to their coefficients."""
     crossed = [depth * other for depth, other in zip(depths, reversed(pair), strict=True)]
     return bool(np.abs(crossed[0] - crossed[1]).max() <= ALIKE * np.abs(crossed[0]).max())

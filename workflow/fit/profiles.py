@@ -134,8 +134,17 @@ class _Search:
         by_finer = scars.moved_by(found, coarse[1] - coarse[0])
         warned = dict.fromkeys(warning for one in last for warning in one.warnings)
         fitted = self._fitted(scars, found)
-        doubts = *fitted.doubts, *(f"the runs: {warning}" for warning in warned)
-        return self._with_runs(replace(fitted, doubts=doubts), scars, missing, by_finer, settled)
+        plausibility_warnings = (
+            *fitted.plausibility_warnings,
+            *(f"the runs: {warning}" for warning in warned),
+        )
+        return self._with_runs(
+            replace(fitted, plausibility_warnings=plausibility_warnings),
+            scars,
+            missing,
+            by_finer,
+            settled,
+        )
 
     def _run(self, wanted: Sequence[Pair], finer: Mapping[str, Any] | None = None) -> list[RunScar]:
         return self._runs.scars(wanted, finer, alike=BOTH not in self._bodies)
@@ -205,7 +214,7 @@ class _Search:
     ) -> Fitted:
         """Return the result with the number of runs and the errors due to them."""
         how = ", ".join(f"{path}: {scalar(value)}" for path, value in self._file.finer.items())
-        told, doubts, numbers = [], list(fitted.doubts), {}
+        reported, plausibility_warnings, numbers = [], list(fitted.plausibility_warnings), {}
         for place in range(_count(scars)):
             parameter, off, finer = fitted.parameters[place], missing[place], by_finer[place]
             deviation = float(np.sqrt(fitted.fit.covariance[place, place]))
@@ -215,23 +224,23 @@ class _Search:
             )
             errors = {"for_want_of_runs": off / size, "by_finer": finer / size}
             numbers[parameter.path] = {name: float(error) for name, error in errors.items()}
-            told.append(
+            reported.append(
                 f"{parameter.path}: has an error of about {off / size:.2g} because runs are few, "
                 f"and changes by {finer / size:+.2g} with finer runs ({how}), relative; its "
                 f"standard deviation is {deviation / size:.2g}"
             )
             if abs(finer) > TOO_COARSE * deviation:
-                doubts.append(
+                plausibility_warnings.append(
                     f"{parameter.path}: finer runs change it by {abs(finer) / deviation:.2g} "
                     "standard deviations, which its bounds do not include; make the cases finer"
                 )
         if not settled:
-            doubts.append("runs are too few: leaving one out still changes the fit")
+            plausibility_warnings.append("runs are too few: leaving one out still changes the fit")
         count = counted(len(self._runs.made), "run")
         return replace(
             fitted,
-            doubts=tuple(doubts),
-            told=(f"{count} of {counted(self._runs.count, 'case')}", *told),
+            plausibility_warnings=tuple(plausibility_warnings),
+            reported=(f"{count} of {counted(self._runs.count, 'case')}", *reported),
             runs={"made": len(self._runs.made), "relative_errors": numbers},
         )
 

@@ -11,7 +11,7 @@ import numpy as np
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
 from workflow.fit.fitting import Fitted, Parameter
-from workflow.fit.section import entries_of, told
+from workflow.fit.section import entries_of, reported
 from workflow.shell.folders.versions import versions
 from workflow.shell.output.tables import heading
 
@@ -26,8 +26,8 @@ HEADINGS = ("parameter", "value", "+-", "95 % bounds", "decided by")
 def report(fitted: Fitted) -> list[str]:
     """Return the table of parameters, followed by notes."""
     rows = [HEADINGS, *(_row(fitted, parameter) for parameter in fitted.parameters)]
-    told_rows = [row for row in rows if len(row) > 1]
-    widths = [max(len(row[k]) for row in told_rows) for k in range(len(HEADINGS))]
+    material_rows = [row for row in rows if len(row) > 1]
+    widths = [max(len(row[k]) for row in material_rows) for k in range(len(HEADINGS))]
     lines = [
         GAP.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
@@ -39,8 +39,8 @@ def _row(fitted: Fitted, parameter: Parameter) -> tuple[str, ...]:
     estimate = parameter.estimate
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     if not estimate.determined:
-        return parameter.path, "not determined", "", estimate.doubt, _decided(fitted, parameter)
-    value, deviation, bounds = told(parameter)
+        return parameter.path, "not determined", "", estimate.caveat, _decided(fitted, parameter)
+    value, deviation, bounds = reported(parameter)
     return parameter.path, value + unit, deviation, bounds + unit, _decided(fitted, parameter)
 
 
@@ -90,7 +90,7 @@ def _scatter(fitted: Fitted, place: int) -> float:
 def _notes(fitted: Fitted) -> list[str]:
     found = fitted.fit
     how = "normal, with the given standard deviations" if found.known else "Student's"
-    lines = [*fitted.told, f"+- is one standard deviation; bounds are {how}"]
+    lines = [*fitted.reported, f"+- is one standard deviation; bounds are {how}"]
     lines += [
         f"{parameter.path}: the model is nonlinear within its bounds, which are of its profile"
         for parameter in fitted.parameters
@@ -100,7 +100,7 @@ def _notes(fitted: Fitted) -> list[str]:
         f"{first} and {second} have a correlation of {value:.3f}: neither is determined alone"
         for first, second, value in _close(fitted)
     ]
-    return lines + [f"warning: {doubt}" for doubt in fitted.doubts]
+    return lines + [f"warning: {caveat}" for caveat in fitted.plausibility_warnings]
 
 
 def _close(fitted: Fitted) -> list[tuple[str, str, float]]:
@@ -145,7 +145,7 @@ def summary(fitted: Fitted, section: str) -> dict[str, Any]:
         "excess": _finite(found.excess),
         "starts": {"tried": found.tried, "reached": found.reached},
         **({"runs": dict(fitted.runs)} if fitted.runs else {}),
-        "doubts": list(fitted.doubts),
+        "doubts": list(fitted.plausibility_warnings),
         "section": section,
         "versions": versions(),
     }
@@ -160,7 +160,7 @@ def _of_parameter(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
         "deviation": parameter.shown(estimate.deviation) if known else None,
         "bounds": [parameter.shown(bound) for bound in estimate.bounds] if known else None,
         "determined": known,
-        "doubt": estimate.doubt,
+        "doubt": estimate.caveat,
         "fitted_as_logarithm": estimate.logarithmic,
         "bounds_of_profile": known and not estimate.straight,
         "shares": {

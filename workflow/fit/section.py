@@ -55,7 +55,7 @@ def quantity(text: str, unit: str) -> float | str:
     return float(text) if unit == "1" else f"{text} {unit}"
 
 
-def told(parameter: Parameter) -> tuple[str, str, str]:
+def reported(parameter: Parameter) -> tuple[str, str, str]:
     """Return value, deviation and bounds of a determined parameter, without the unit."""
     estimate = parameter.estimate
     deviation = parameter.shown(estimate.deviation)
@@ -85,8 +85,8 @@ def _row(fitted: Fitted, path: str, key: str) -> EntryRow:
     """Return the entry of a free parameter."""
     parameter = fitted.by_path[path]
     if not parameter.estimate.determined:
-        return EntryRow(key, LEFT_OUT, parameter.estimate.doubt, off=True)
-    _, _, bounds = told(parameter)
+        return EntryRow(key, LEFT_OUT, parameter.estimate.caveat, off=True)
+    _, _, bounds = reported(parameter)
     deviation = parameter.shown(parameter.estimate.deviation)
     value = rounded(parameter.shown(parameter.estimate.value), deviation, IN_SECTION)
     return EntryRow(key, quantity(value, parameter.unit), f"{BOUNDS}{bounds}")

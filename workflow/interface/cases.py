@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from workflow import kinds
-from workflow.case.doubts import doubts_of
+from workflow.case.plausibility import plausibility_warnings_of
 from workflow.case.sections import Case
 from workflow.case.source import IN_PYTHON, dotted
 from workflow.case.text.leaves import taken
@@ -68,7 +68,7 @@ class Check:
     ``title`` is the title of the case and ``outline`` has rows of name and text on what would run.
     ``memory`` is an upper estimate of the memory [bytes]. ``seconds`` is the order of magnitude of
     the run time [s]; ``time`` is the same as text, with what cannot be known before the run.
-    ``doubts`` are plausibility warnings.
+    ``plausibility_warnings`` are plausibility warnings.
 
     Examples
     --------
@@ -76,7 +76,7 @@ class Check:
 
     >>> import fretscale
     >>> checked = fretscale.check("cases/sphere_normal.yaml")
-    >>> print(checked.title, checked.outline[1], checked.doubts)
+    >>> print(checked.title, checked.outline[1], checked.plausibility_warnings)
     Sphere pressed on a flat (Hertz) ('load path', '1 increment of P') ()
     """
 
@@ -85,13 +85,15 @@ class Check:
     memory: float
     seconds: float
     time: str
-    doubts: tuple[str, ...]
+    plausibility_warnings: tuple[str, ...]
 
     def __str__(self) -> str:
         memory = f"up to {self.memory / 1e9:.1f} GB"
         rows = *self.outline, ("memory", memory), ("time", self.time)
         lines = [f"  {name:<10} {text}" for name, text in rows]
-        return "\n".join([self.title, *lines, *(f"warning: {doubt}" for doubt in self.doubts)])
+        return "\n".join(
+            [self.title, *lines, *(f"warning: {warning}" for warning in self.plausibility_warnings)]
+        )
 
 
 def check(case: AnyCase, /, **overrides: Any) -> Check:
@@ -112,8 +114,13 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
     check_measured(loaded, analysis.curves, analysis.layout(loaded))
     memory, time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
-    outline, doubts = (*loaded.outline(), *taken(loaded)), tuple(doubts_of(loaded))
-    return Check(loaded.title, outline, memory.required, time.seconds, time.text, doubts)
+    outline, plausibility_warnings = (
+        (*loaded.outline(), *taken(loaded)),
+        tuple(plausibility_warnings_of(loaded)),
+    )
+    return Check(
+        loaded.title, outline, memory.required, time.seconds, time.text, plausibility_warnings
+    )
 
 
 def _text(value: object) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # Attributes that distinguish numbered groups: the first that all groups have, else their number.
-TOLD_APART_BY = ("cycles", "increment", "force", "level", "energy", "frequency")
+DISTINGUISHED_BY = ("cycles", "increment", "force", "level", "energy", "frequency")
 NUMBER = "number"
 
 
@@ -104,7 +104,7 @@ class Group(Mapping[str, "Group | xr.DataArray"]):
             if not numbered:
                 return found
             parts = [_data_set(part) for part in numbered.values()]
-            along = xarray.Variable(*_told_apart(numbered))
+            along = xarray.Variable(*_distinguishing_attribute(numbered))
         first = parts[0]
         alike = [
             name
@@ -136,7 +136,7 @@ class Group(Mapping[str, "Group | xr.DataArray"]):
                 {k: v for k, v in _attributes(part).items() if np.ndim(v) == 0}
                 for part in numbered.values()
             ]
-            axis, places = _told_apart(numbered) if numbered else ("", [])
+            axis, places = _distinguishing_attribute(numbered) if numbered else ("", [])
         curves = [name for name, array in found.data_vars.items() if array.ndim == 1]
         dims = {found[name].dims for name in curves}
         if len(dims) == 1:
@@ -244,10 +244,10 @@ def _numbered(group: h5py.Group) -> dict[str, h5py.Group]:
     return {name: group[name] for name in group if name.isdecimal()}
 
 
-def _told_apart(numbered: Mapping[str, h5py.Group]) -> tuple[str, list[Any]]:
+def _distinguishing_attribute(numbered: Mapping[str, h5py.Group]) -> tuple[str, list[Any]]:
     """Return the attribute that distinguishes the groups, and its value for each."""
     attributes = [_attributes(part) for part in numbered.values()]
-    for name in TOLD_APART_BY:
+    for name in DISTINGUISHED_BY:
         places = [found.get(name) for found in attributes]
         if None not in places and len(set(places)) == len(places):
             return name, places

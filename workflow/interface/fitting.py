@@ -70,7 +70,7 @@ class FittedParameter(NamedTuple):
     """Free parameter in ``unit``: its ``value``, standard ``deviation`` and 95 % bounds.
 
     The bounds are ``lower`` and ``upper``. Numbers are None where the data do not determine the
-    parameter; ``doubt`` then says why. ``shares`` are the contributions of each kind of data to
+    parameter; ``caveat`` then says why. ``shares`` are the contributions of each kind of data to
     the variance.
 
     Examples
@@ -86,7 +86,7 @@ class FittedParameter(NamedTuple):
     deviation: float | None
     lower: float | None
     upper: float | None
-    doubt: str
+    caveat: str
     shares: dict[str, float]
 
 
@@ -95,7 +95,8 @@ class FitResult:
 
     ``parameters`` has the parameters by their paths in a case, as has ``result["joint.friction"]``.
     ``correlation`` is their correlation matrix ``(p, p)``, ``section`` the YAML of a case, and
-    ``doubts`` are warnings about the fit. ``summary`` has all of this, as in ``summary.json``.
+    ``plausibility_warnings`` are warnings about the fit. ``summary`` has all of this, as in
+    ``summary.json``.
 
     Examples
     --------
@@ -122,7 +123,7 @@ class FitResult:
     def __init__(self, fitted: Fitted) -> None:
         self._fitted = fitted
         self.section = section_of(fitted)
-        self.doubts = fitted.doubts
+        self.plausibility_warnings = fitted.plausibility_warnings
         self.summary = summary(fitted, self.section)
 
     def __getitem__(self, path: str) -> FittedParameter:
@@ -134,7 +135,7 @@ class FitResult:
     @property
     def parameters(self) -> dict[str, FittedParameter]:
         """Free parameters by their paths."""
-        return {path: _parameter(told) for path, told in self.summary["parameters"].items()}
+        return {path: _parameter(reported) for path, reported in self.summary["parameters"].items()}
 
     @property
     def correlation(self) -> Array:
@@ -142,14 +143,14 @@ class FitResult:
         return self._fitted.fit.correlation
 
 
-def _parameter(told: Mapping[str, Any]) -> FittedParameter:
-    lower, upper = told["bounds"] or (None, None)
+def _parameter(reported: Mapping[str, Any]) -> FittedParameter:
+    lower, upper = reported["bounds"] or (None, None)
     return FittedParameter(
-        told["unit"],
-        told["value"],
-        told["deviation"],
+        reported["unit"],
+        reported["value"],
+        reported["deviation"],
         lower,
         upper,
-        told["doubt"],
-        dict(told["shares"]),
+        reported["doubt"],
+        dict(reported["shares"]),
     )

@@ -44,7 +44,7 @@ class Progress(Observer):
             self._print(name)
         yield
 
-    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+    def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
         self._print(
             f"jump {after.jump}: {after.cycles[-1]:.6g} cycles, "
             f"largest depth {1e3 * after.depth:.4g} um"
@@ -76,7 +76,7 @@ class Checkpoint(Observer):
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
 
-    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+    def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
         data, _ = packed(after)
         write_arrays(self.path, {STATE: np.frombuffer(data, dtype=np.uint8)})
 

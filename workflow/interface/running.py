@@ -14,7 +14,7 @@ from workflow.interface.cases import AnyCase, load_case
 from workflow.interface.results import Results
 from workflow.interface.results import open as open_results
 from workflow.kinds import kind_of
-from workflow.runs.run import bring_to_end, kept_in, run_case
+from workflow.runs.run import bring_to_end, run_case, stored_run
 from workflow.shell.terminal.screen import Loudness
 from workflow.shell.terminal.streams import hold_standard_streams
 
@@ -65,7 +65,7 @@ def run(
     loaded = load_case(case, **overrides)
     folder = OUT / _name(case, loaded) if out is None else Path(out)
     loudness = Loudness.QUIET if quiet else Loudness.NORMAL
-    if not force and kept_in(folder, loaded) in ("finished", "unfinished"):
+    if not force and stored_run(folder, loaded) in ("finished", "unfinished"):
         bring_to_end(loaded, folder, loudness=loudness)
     else:
         run_case(loaded, folder, force, loudness)

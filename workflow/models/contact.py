@@ -195,12 +195,12 @@ class Wear:
 class ContactEnd:
     """A cycle on the surfaces at the end of a run.
 
-    ``pressure_of_companion`` ``(t, nx, ny)`` [MPa] is the pressure on the surfaces of the run with
+    ``pressure_of_coarse_run`` ``(t, nx, ny)`` [MPa] is the pressure on the surfaces of the run with
     steps of twice the length; None if no such steps were taken.
     """
 
     tractions: CycleTractions
-    pressure_of_companion: Array | None
+    pressure_of_coarse_run: Array | None
 
 
 class FaceContact(InterfaceContact):
@@ -289,9 +289,9 @@ class FaceContact(InterfaceContact):
 
     def end(self, state: InterfaceState) -> ContactEnd:
         """Return the cycle on the surfaces at the end of a run."""
-        companion, pressure = state.coarse, None
-        if step_errors(state, self.areas) is not None and isinstance(companion, InterfaceState):
-            pressure = self.tractions(companion).pressure
+        coarse_run, pressure = state.coarse, None
+        if step_errors(state, self.areas) is not None and isinstance(coarse_run, InterfaceState):
+            pressure = self.tractions(coarse_run).pressure
         return ContactEnd(self.tractions(state), pressure)
 
     def loop(self, state: InterfaceState, peak: int, loops: TangentialLoops) -> WornLoop:

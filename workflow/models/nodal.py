@@ -27,7 +27,7 @@ from wear.steps.marching import advance_cycles
 from wear.steps.stabilised import StabilisedStepper
 from wear.steps.steppers import first_cycles
 from wear.surfaces import Surfaces
-from wear.worn import Spent
+from wear.worn import Cost
 from workflow.models.contact import Contact, ContactOf, FaceContact, Wear
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import ContactFace
@@ -189,7 +189,7 @@ class NodalContacts(FaceContacts):
 
     def jump(
         self, states: Sequence[InterfaceState], cycles: float, left: float
-    ) -> list[tuple[InterfaceState, Spent]]:
+    ) -> list[tuple[InterfaceState, Cost]]:
         state = self._together(states)
         begun = self._cycles.at(state.surfaces.depth)
 
@@ -199,13 +199,13 @@ class NodalContacts(FaceContacts):
             return self._contact(begun if alike else self._cycles.near(depth, begun))
 
         result = advance_cycles(self._stepper, state, cycles, left, contact_at)
-        spent = result.spent
-        spent = replace(spent, contact_solves=spent.contact_solves * len(begun.states))
+        cost = result.cost
+        cost = replace(cost, contact_solves=cost.contact_solves * len(begun.states))
         lost = _fields(result.state.surfaces) - _fields(state.surfaces)
         after = self._cycles.at(result.state.surfaces.depth)
         worn = self._of_interfaces(result.state, lost / cycles, after)
         # All faces wear together, so the cost counts once.
-        return [(face, Spent() if number else spent) for number, face in enumerate(worn)]
+        return [(face, Cost() if number else cost) for number, face in enumerate(worn)]
 
     def _contact(self, solution: CycleSolution) -> NodalContact:
         histories = self._cycles.on_faces(solution)
@@ -216,7 +216,7 @@ class NodalContacts(FaceContacts):
     def _together(self, states: Sequence[InterfaceState]) -> NodalState:
         """Return the state of all nodes, with its coarse companion if every face has one."""
         fields = np.concatenate([_fields(state.surfaces) for state in states], axis=-1)
-        companions = [state.coarse for state in states if state.coarse is not None]
+        probe_cases = [state.coarse for state in states if state.coarse is not None]
         first = states[0]
         return NodalState(
             surfaces=Surfaces.unworn(self._gap).worn(*fields[[0, 1, 2, 2]]),
@@ -224,7 +224,7 @@ class NodalContacts(FaceContacts):
             depth_rate=max(state.depth_rate for state in states),
             volume_rate=sum(state.volume_rate for state in states),
             next_cycles=first.next_cycles,
-            coarse=self._together(companions) if companions else None,
+            coarse=self._together(probe_cases) if probe_cases else None,
             order=first.order,
         )
 
@@ -243,7 +243,7 @@ class NodalContacts(FaceContacts):
         histories = self._cycles.on_faces(solution)
         parts = map(split, (self._gap, _fields(state.surfaces), rates, self._areas))
         faces = []
-        for gap, worn, rate, areas, history, companion in zip(
+        for gap, worn, rate, areas, history, coarse_run in zip(
             *parts, histories, coarse, strict=True
         ):
             faces.append(
@@ -253,7 +253,7 @@ class NodalContacts(FaceContacts):
                     depth_rate=float(rate[:2].max()),
                     volume_rate=float(rate[:2].sum(axis=0) @ areas),
                     next_cycles=state.next_cycles,
-                    coarse=companion,
+                    coarse=coarse_run,
                     order=state.order,
                     start=depth,
                     loads=history.loads,
@@ -275,7 +275,7 @@ class NodalContacts(FaceContacts):
                     pressure=_on_cells(stage, history).pressure,
                     touches_border=False,  # there the body itself ends
                     largest_residual=solution.residual,
-                    spent=Spent() if number else Spent(len(history.slip)),
+                    cost=Cost() if number else Cost(len(history.slip)),
                     stable_cycles=stable,
                     link=StructureLink.none(),
                     cycle=(),

@@ -61,7 +61,7 @@ class ResultsRecorder(Observer):
     def begin(self, state: CoupledState) -> None:
         self._record(state)
 
-    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+    def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
         self._record(after)
 
     def _record(self, state: CoupledState) -> None:

@@ -382,7 +382,7 @@ class StructureLoads(ReportsProgress):
         jobs = [
             partial(self._stress, self._on(mesh), of, shown, done) for mesh, of in states.values()
         ]
-        return dict(zip(states, self.structure.at_once(*jobs), strict=True))
+        return dict(zip(states, self.structure.run_parallel(*jobs), strict=True))
 
     def worn_mesh(self, depths: list[tuple[Array, Array]]) -> StructureMesh:
         """Return the mesh whose faces have lost nodal ``depths`` ``(n,)`` of body 1 and 2 [mm].

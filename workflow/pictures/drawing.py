@@ -35,29 +35,31 @@ def write_pictures(
     pictures: Callable[[], Pictures],
     contents: Any,
     isolated: Isolation,
-    beside: WorkerProcess | None = None,
+    worker: WorkerProcess | None = None,
     share: Share = "pictures",
     progress: Progress = unseen,
 ) -> dict[str, str]:
     """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
     ``contents`` describes the results for ``pictures``. Each picture is ``isolated`` from the
-    others and from the run, so that one that fails is left out. A worker process ``beside`` this
+    others and from the run, so that one that fails is left out. A worker process ``worker`` this
     one does a ``share`` of the work, and ``progress`` is called with what is done. Returns the
     figures for the report, if the case asks for one: SVG texts by their names, in the order of
     presentation.
     """
-    formats, told = output.figure_formats, (pictures, contents, folder.results)
+    formats, reported = output.figure_formats, (pictures, contents, folder.results)
     names = tuple(pictures().figures_of(contents)) if formats else ()
     with ExitStack() as stack:
         tasks: list[Task] = []
         if formats:
             figures = stack.enter_context(folder.filling("figures", "figures of the results"))
-            tasks += [(_write_figure, (*told, figures, n, formats, output.report)) for n in names]
+            tasks += [
+                (_write_figure, (*reported, figures, n, formats, output.report)) for n in names
+            ]
         if output.paraview:
             paraview = stack.enter_context(folder.filling("paraview", "files for ParaView"))
-            tasks.append((write_paraview, (*told, paraview)))
-        there = beside if share != "nothing" else None
+            tasks.append((write_paraview, (*reported, paraview)))
+        there = worker if share != "nothing" else None
         own = len(names) if share == "files" else 0
         attempts: list[Task] = [(attempt, task) for task in tasks]
         written = share_out(attempts, there, Tally(progress, len(tasks)), own)

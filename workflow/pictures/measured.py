@@ -20,7 +20,7 @@ from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.pictures.style import AMBER, BLACK, BLUE, ORANGE
 from workflow.shell.analysis import Pictures
-from workflow.shell.output.measured import MeasuredCurve, beside
+from workflow.shell.output.measured import MeasuredCurve, compare_with_curve
 from workflow.shell.output.quantities import CurvesOf
 
 # Name of the figure with all measured points.
@@ -52,7 +52,7 @@ def _found(
     """Yield the entries that can be compared; a warning of the run explains why others cannot."""
     for entry in measured:
         try:
-            yield beside(entry, file, curves)
+            yield compare_with_curve(entry, file, curves)
         except UserError:
             continue
 
@@ -122,7 +122,7 @@ def _draw_points(
 ) -> None:
     points = found.points if whole else found.points.only(found.inside)
     bars = None if points.deviations is None else points.deviations / y_unit
-    told = "measured" if bars is None else "measured, one standard deviation"
+    reported = "measured" if bars is None else "measured, one standard deviation"
     axis.errorbar(
         points.x / x_unit,
         points.y / y_unit,
@@ -134,7 +134,7 @@ def _draw_points(
         lw=1.2,
         capsize=3.0,
         zorder=5,
-        label=told,
+        label=reported,
     )
 
 

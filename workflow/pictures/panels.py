@@ -124,7 +124,7 @@ def volume_unit(largest: float) -> tuple[float, str]:
     return (1.0, "mm³") if largest >= SMALL_VOLUME else (1e9, "µm³")
 
 
-def legend_beside(axis: Axes, title: str | None = None) -> None:
+def legend_on_the_right(axis: Axes, title: str | None = None) -> None:
     """Draw a legend to the right of the panel."""
     axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=title)
 

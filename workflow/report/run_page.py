@@ -29,7 +29,7 @@ from workflow.report.page import (
     table,
     unbroken,
 )
-from workflow.report.told import ToldRun
+from workflow.report.report_data import ReportData
 from workflow.shell.output.expectations import Verdict, verdicts
 from workflow.shell.output.quantities import SummaryQuantity
 from workflow.shell.output.summary import QuantityError, counted_from_first
@@ -50,7 +50,7 @@ AT_ONCE = 0.05
 DIGEST = 12
 
 
-def run_page(run: ToldRun) -> str:
+def run_page(run: ReportData) -> str:
     """Return the complete report."""
     quantities = analysis_of(run.case).quantities(run.case, run.summary)
     budget = error_budget(quantities, run.summary)
@@ -72,21 +72,21 @@ def run_page(run: ToldRun) -> str:
     return page(run.case.title, _header(run, parts), *parts)
 
 
-def _header(run: ToldRun, parts: Sequence[Html]) -> Html:
+def _header(run: ReportData, parts: Sequence[Html]) -> Html:
     version = run.summary["versions"]["fretscale"]
     what = (type(run.case).__doc__ or "").partition("\n")[0]
     lead = f"{what} Computed by fretscale {version}"
     warnings = len(run.summary["warnings"])
-    told = f"{warnings} warning{'s' * (warnings != 1)}" if warnings else "no warnings"
+    reported = f"{warnings} warning{'s' * (warnings != 1)}" if warnings else "no warnings"
     return element(
         "header",
         element("h1", run.case.title),
-        element("p", f"{lead}; {told}{_met(run)}.", cls="lead"),
+        element("p", f"{lead}; {reported}{_met(run)}.", cls="lead"),
         contents_of(parts),
     )
 
 
-def _met(run: ToldRun) -> str:
+def _met(run: ReportData) -> str:
     found = _verdicts(run)
     if not found:
         return ""
@@ -97,7 +97,7 @@ def _met(run: ToldRun) -> str:
 # --- sections -----------------------------------------------------------------------------------
 
 
-def _outline(run: ToldRun) -> Html:
+def _outline(run: ReportData) -> Html:
     return table(["", ""], [[name, typeset(text)] for name, text in run.case.outline()])
 
 
@@ -110,14 +110,14 @@ def _warnings(warnings: Sequence[str]) -> Html:
         if not colon or (" " in place and alike[rest] == 1):
             place, rest = "", warning
         places.setdefault(typeset(rest), []).append(typeset(place))
-    told = (
+    reported = (
         element("span", element("strong", "; ".join(those)), ": ", rest) if any(those) else rest
         for rest, those in places.items()
     )
-    return items(told) if places else Html("")
+    return items(reported) if places else Html("")
 
 
-def _verdicts(run: ToldRun) -> list[Verdict | str]:
+def _verdicts(run: ReportData) -> list[Verdict | str]:
     """Return the verdict on each expectation, or the reason why there is no number to compare."""
     found: list[Verdict | str] = []
     for entry in run.case.expect:
@@ -129,7 +129,7 @@ def _verdicts(run: ToldRun) -> list[Verdict | str]:
     return found
 
 
-def _expectations(run: ToldRun) -> Html:
+def _expectations(run: ReportData) -> Html:
     found = _verdicts(run)
     if not found:
         return Html("")
@@ -145,8 +145,10 @@ def _expectations(run: ToldRun) -> Html:
         rows.append([name, *_verdict_cells(verdict, quantity), source])
     head = ["", "expected", "computed", "off by", "allowed", "", "expected from"]
     signs = any(entry.quantity.startswith(SIGNS) for entry in run.case.expect)
-    told = note("For a change or trend, 1 is a rise, −1 a fall, and 0 neither.") if signs else ""
-    return lines([table(head, rows, numbers=(1, 2, 3, 4), stacks=True), html(told)])
+    reported = (
+        note("For a change or trend, 1 is a rise, −1 a fall, and 0 neither.") if signs else ""
+    )
+    return lines([table(head, rows, numbers=(1, 2, 3, 4), stacks=True), html(reported)])
 
 
 def _verdict_cells(verdict: Verdict | str, quantity: SummaryQuantity | None) -> list[object]:
@@ -180,16 +182,16 @@ def _measured(summary: Mapping[str, Any]) -> Html:
     if not rows:
         return Html("")
     head = ["", "points", "mean", "rms", "rms, relative", "chi² per point", "most at", "from"]
-    told = (
+    reported = (
         "Computed minus measured, with straight lines between computed points. Relative is over "
         "the rms of what was measured. A chi² of 1 is the scatter that the deviations give."
     )
     if any(one["nearest_of_several_branches"] for one in found if "refused" not in one):
-        told += (
+        reported += (
             " Of several branches of a curve the nearest one counts, so the difference may be "
             "too small."
         )
-    return lines([table(head, rows, numbers=(1, 2, 3, 4, 5, 6), stacks=True), html(note(told))])
+    return lines([table(head, rows, numbers=(1, 2, 3, 4, 5, 6), stacks=True), html(note(reported))])
 
 
 def _measured_cells(one: Mapping[str, Any]) -> list[object]:
@@ -208,7 +210,7 @@ def _measured_cells(one: Mapping[str, Any]) -> list[object]:
     ]
 
 
-def _figures(run: ToldRun) -> Iterator[Html]:
+def _figures(run: ReportData) -> Iterator[Html]:
     for name, svg in run.figures.items():
         yield picture(svg, name.replace("_", " ").capitalize())
     if not run.figures:
@@ -221,13 +223,15 @@ def _figures(run: ToldRun) -> Iterator[Html]:
 
 def _remarks(summary: Mapping[str, Any]) -> Html:
     """Return the explanations that the analysis gives in sentences."""
-    told = [typeset(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("explanation") or ()]
-    return items(told) if told else Html("")
+    reported = [
+        typeset(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("explanation") or ()
+    ]
+    return items(reported) if reported else Html("")
 
 
-def _case(run: ToldRun) -> Iterator[Html]:
+def _case(run: ReportData) -> Iterator[Html]:
     """Yield the entries of the case that differ from their defaults, in two parts."""
-    leaves = [leaf for leaf in leaves_of(run.case) if leaf.told and _top(leaf) not in APART]
+    leaves = [leaf for leaf in leaves_of(run.case) if leaf.is_shown and _top(leaf) not in APART]
     first = [leaf for leaf in leaves if _top(leaf) in LOOKED_FOR]
     assumed = run.case.assumed
     if first:
@@ -261,11 +265,11 @@ def _entries(leaves: Sequence[Leaf], assumed: Sequence[str]) -> Html:
             below = leaf.path.partition(".")[2] or name
             star = "*" if any(f"{leaf.path}.".startswith(f"{path}.") for path in assumed) else ""
             name_of = element("span", code(below), star)
-            rows.append([name_of, _kept_together(given(leaf.text)), leaf.what])
+            rows.append([name_of, _unbroken(given(leaf.text)), leaf.what])
     return table(["", "", ""], rows, stacks=True)
 
 
-def _kept_together(text: str) -> object:
+def _unbroken(text: str) -> object:
     """Return a text, marked to stay in one line if it is short."""
     return element("span", text, cls="short") if len(text) < SHORT else text
 
@@ -301,7 +305,7 @@ def _share(share: float | None) -> str:
     return "–" if share is None else percent(share)
 
 
-def _computing(run: ToldRun) -> Iterator[Html]:
+def _computing(run: ReportData) -> Iterator[Html]:
     yield element("p", "To compute it again, save the case file below as case.yaml and run:")
     yield element("pre", "fretscale run case.yaml --out DIR")
     if run.input_files:

@@ -11,8 +11,8 @@ from workflow.case.sections import Case, Measured
 from workflow.errors import UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import vector_figures
+from workflow.report.report_data import ReportData
 from workflow.report.run_page import run_page
-from workflow.report.told import ToldRun
 from workflow.shell.analysis import Analysis, Pictures
 from workflow.shell.folders.folder import DIGESTS, OutputFolder
 from workflow.shell.folders.lock import locked
@@ -36,7 +36,7 @@ def _with_measured(
     return with_measured(pictures(), measured, curves)
 
 
-def write_page(run: ToldRun, path: Path) -> None:
+def write_page(run: ReportData, path: Path) -> None:
     """Write the report of a run, which appears under its name once it is complete."""
     write_text(path, run_page(run))
 
@@ -48,13 +48,13 @@ def write_report(root: Path, out: Path | None = None) -> Path:
     UserError if there is no finished run or if its files have changed.
     """
     if out is not None:
-        run = told_run(root)
+        run = report_data_of(root)
         out.parent.mkdir(parents=True, exist_ok=True)
         write_page(run, out)
         return out
     check_finished(root)
     with locked(root):
-        run, folder = told_run(root), OutputFolder(root)
+        run, folder = report_data_of(root), OutputFolder(root)
         path = folder.reserve_report()
         write_page(run, path)
     return path
@@ -67,7 +67,7 @@ def check_finished(root: Path) -> OutputFolder:
     return folder
 
 
-def told_run(root: Path, figures: bool = True) -> ToldRun:
+def report_data_of(root: Path, figures: bool = True) -> ReportData:
     """Return the finished run in a folder, with its figures drawn again if wanted.
 
     Raises UserError as :func:`write_report` does.
@@ -79,7 +79,7 @@ def told_run(root: Path, figures: bool = True) -> ToldRun:
     if digests.get(results.name, "") != file_digest(results):
         raise UserError(f"{results}: differs from the run in {root}; {folder.again}")
     case = load_case(folder.case)
-    return ToldRun(
+    return ReportData(
         case=case,
         case_text=read_bytes(folder.case).decode("utf-8"),
         kind=kind_of(case),

@@ -143,13 +143,13 @@ def _on_worker(job: Job, out: Path) -> str:
     worker = get_worker()
     key = worker.get_current_task()
 
-    def unwanted() -> bool:
+    def abandoned() -> bool:
         task = worker.state.tasks.get(key)
         return task is None or task.state == "cancelled"
 
     # The lock can be taken over, because the scheduler gives a run to one worker at a time and only
     # after the last one has died.
-    return run_job(job, out, unwanted, take_over=True)
+    return run_job(job, out, abandoned, take_over=True)
 
 
 def _error_of(future: Any) -> str:

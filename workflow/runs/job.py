@@ -93,13 +93,14 @@ def _end_with_parent() -> None:
 def run_job(
     job: Job,
     out: Path,
-    unwanted: Callable[[], bool],
+    abandoned: Callable[[], bool],
     one_thread: bool = True,
     take_over: bool = False,
 ) -> str:
     """Compute a job in a new process; return the error in one line, or "" if there is none.
 
-    The process is ended if ``unwanted`` returns true. It has a separate process group, so that only
+    The process is ended if ``abandoned`` returns true. It has a separate process group, so that
+    only
     the waiting process receives Ctrl-C. For ``take_over`` see
     :func:`workflow.shell.folders.lock.locked`.
     """
@@ -119,7 +120,7 @@ def run_job(
             start_new_session=True,
         )
         try:
-            return _ending(process, *_wait(process, unwanted))
+            return _ending(process, *_wait(process, abandoned))
         finally:
             process.kill()
             process.wait()
@@ -128,13 +129,13 @@ def run_job(
         os.close(lifeline)
 
 
-def _wait(process: subprocess.Popen[str], unwanted: Callable[[], bool]) -> tuple[str, str]:
+def _wait(process: subprocess.Popen[str], abandoned: Callable[[], bool]) -> tuple[str, str]:
     """Wait for the end of the process, and return what it wrote to stdout and stderr."""
     while True:
         try:
             return process.communicate(timeout=LOOK)
         except subprocess.TimeoutExpired:
-            if unwanted():
+            if abandoned():
                 process.kill()
 
 

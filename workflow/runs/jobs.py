@@ -15,7 +15,7 @@ from workflow.case.sections import Case
 from workflow.errors import Ending, one_line
 from workflow.runs.cluster import run_on_cluster
 from workflow.runs.job import Finished, Job, finished, run_job
-from workflow.runs.run import kept_in
+from workflow.runs.run import stored_run
 from workflow.shell.folders.folder import OutputFolder
 
 
@@ -58,7 +58,7 @@ def run_jobs(
             continue
         root = out / job.name
         # A finished run with leftovers is not reused here: resuming it removes them.
-        if kept_in(root, case) == "finished" and not OutputFolder(root).has_leftovers:
+        if stored_run(root, case) == "finished" and not OutputFolder(root).has_leftovers:
             end(job, "")
         else:
             left.append((job, case))

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from workflow.case.changing import changed
-from workflow.case.doubts import doubts_of
+from workflow.case.plausibility import plausibility_warnings_of
 from workflow.case.sections import Case
 from workflow.case.text.writing import dump_case
 from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import load_what_draws, write_pictures
-from workflow.report.told import ToldRun
+from workflow.report.report_data import ReportData
 from workflow.report.writing import pictures_of, write_page
 from workflow.runs.first_look import first_look
 from workflow.runs.provenance import case_values, provenance_of
@@ -77,7 +77,7 @@ def bring_to_end(
     """
     with _working(case, root, PATIENCE, take_over) as gone:
         OutputFolder(root).refuse_foreign()
-        (kept, damaged), folder = _kept_and_damaged(root, case), OutputFolder(root)
+        (kept, damaged), folder = _stored_and_damaged(root, case), OutputFolder(root)
         if kept == "finished":
             folder.clear_leftovers()
             return False
@@ -88,15 +88,15 @@ def bring_to_end(
         return True
 
 
-def kept_in(root: Path, case: Case) -> Kept:
+def stored_run(root: Path, case: Case) -> Kept:
     """Return what kind of run a folder has of this case; "other" is a run of another case.
 
     A run whose files, or whose input files, have changed counts as "nothing".
     """
-    return _kept_and_damaged(root, case)[0]
+    return _stored_and_damaged(root, case)[0]
 
 
-def _kept_and_damaged(root: Path, case: Case) -> tuple[Kept, str]:
+def _stored_and_damaged(root: Path, case: Case) -> tuple[Kept, str]:
     """Return what a folder has of this case, and why a damaged run there cannot be used."""
     folder, record, damaged = OutputFolder(root), None, ""
     if not folder.case.exists():
@@ -208,7 +208,7 @@ def _run(
     analysis: Analysis,
     case: Case,
     folder: OutputFolder,
-    told: Sequence[str],
+    reported: Sequence[str],
     loudness: Loudness,
     resume: bool = False,
     kept: StoredState | None = None,
@@ -219,11 +219,11 @@ def _run(
 
     def draw(contents: Any) -> None:
         isolated, output = reporter.isolated, case.output
-        with reporter.stage("paraview and figures", "pictures") as told, isolated("figures"):
+        with reporter.stage("paraview and figures", "pictures") as reported, isolated("figures"):
             if pictures is not None:
                 drawn.extend(_names(pictures, case, contents))
                 told_of = folder, pictures, contents, isolated
-                figures.update(write_pictures(output, *told_of, beside, share, told))
+                figures.update(write_pictures(output, *told_of, worker, share, reported))
 
     def report(summary: Summary) -> None:
         with reporter.isolated(REPORT):
@@ -235,11 +235,11 @@ def _run(
     drawn: list[str] = []
     with (
         closing(Reporter(folder.reserve_log(), resume, loudness=loudness)) as reporter,
-        closing(WorkerProcess()) as beside,
+        closing(WorkerProcess()) as worker,
     ):
         with reporter.isolated(FORECAST):
             reporter.expected = analysis.run_time(case)
-        for line in filter(None, told):
+        for line in filter(None, reported):
             reporter.say(line)
         if stays:
             reporter.warn(
@@ -260,11 +260,11 @@ def _run(
             draw=draw,
             measured=partial(tell_measured, case, analysis.curves, folder.results),
             report=report,
-            beside=beside,
+            worker=worker,
         )
         if share != "nothing":
             with reporter.isolated("figures"):
-                beside.begin(load_what_draws, pictures, case.output, share)
+                worker.begin(load_what_draws, pictures, case.output, share)
         with telling(reporter):
             analysis.run(run)
         with reporter.isolated(TERMINAL):
@@ -280,8 +280,8 @@ def _names(pictures: Callable[[], Pictures], case: Case, contents: Any) -> list[
 def _share(analysis: Analysis, case: Case) -> Share:
     """Return the share of the pictures of a run that the worker process draws."""
     output = case.output
-    alone = analysis.beside == "files" and not output.paraview
-    return "nothing" if alone or not output.figure_formats else analysis.beside
+    alone = analysis.in_worker == "files" and not output.paraview
+    return "nothing" if alone or not output.figure_formats else analysis.in_worker
 
 
 def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -> None:
@@ -289,8 +289,8 @@ def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -
     long = not resume and expected.seconds >= SHORT_RUN
     takes = f" ({expected.short})" if long else ""
     reporter.say(f"{'resume' if resume else 'run'}: {case.title}{takes}")
-    for doubt in doubts_of(case):
-        reporter.say(f"warning: {doubt}", always=True)
+    for warning in plausibility_warnings_of(case):
+        reporter.say(f"warning: {warning}", always=True)
 
 
 def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
@@ -307,7 +307,7 @@ def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
 
 def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None:
     """Write the report of a run."""
-    told = ToldRun(
+    reported = ReportData(
         case=run.case,
         case_text=read_bytes(run.folder.case).decode("utf-8"),
         kind=run.kind,
@@ -315,7 +315,7 @@ def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None
         input_files=run.provenance["input_files"],
         figures=figures,
     )
-    write_page(told, run.folder.reserve_report())
+    write_page(reported, run.folder.reserve_report())
 
 
 def _is_case(path: Path, case: Case) -> bool:

@@ -58,9 +58,9 @@ def verify_cases(cases: tuple[Path, ...], out: Path, loudness: Loudness = Loudne
             )
             table.add_row(verdict.entry.quantity, *row, verdict.entry.source)
             if not verdict.met and loudness is Loudness.QUIET:
-                told = f"{verdict.computed:.6g} {verdict.unit}".rstrip()
+                reported = f"{verdict.computed:.6g} {verdict.unit}".rstrip()
                 terminal().print(
-                    f"warning: {path}: {verdict.entry.quantity}: {told}, expected "
+                    f"warning: {path}: {verdict.entry.quantity}: {reported}, expected "
                     f"{verdict.expected:.6g}",
                     markup=False,
                     soft_wrap=True,

@@ -59,7 +59,7 @@ class Run(Generic[AnyCase]):
         Returns the comparison with measured points, in the form stored in the summary.
     report
         Writes the report from the final summary and the figures.
-    beside
+    worker
         Worker process for work that the run need not wait for; it draws at the end.
     """
 
@@ -75,7 +75,7 @@ class Run(Generic[AnyCase]):
     draw: Callable[[Any], None]
     measured: Callable[[], list[dict[str, Any]]]
     report: Callable[[Summary], None]
-    beside: WorkerProcess
+    worker: WorkerProcess
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ class Analysis(Generic[AnyCase]):
         Curves that are drawn over each other where runs are compared.
     pictures
         Returns the functions that show the results.
-    beside
+    worker
         Output that a second process helps to draw; figures are excluded if drawing them takes less
         than the half second in which that process would load the plotting library.
     resumable
@@ -190,7 +190,7 @@ class Analysis(Generic[AnyCase]):
     layout: Callable[[AnyCase], Layout] = lambda case: Layout({})
     curves: Sequence[CurvesOf] = ()
     pictures: Callable[[], Pictures] | None = None
-    beside: Share = "nothing"
+    in_worker: Share = "nothing"
     resumable: bool = False
     choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = as_written
     comparison: ChartComparison[AnyCase] = ChartComparison()

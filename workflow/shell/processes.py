@@ -41,7 +41,7 @@ Done = Callable[[], None]
 """Called whenever a part of longer work is done, from any thread."""
 
 
-def _unheard() -> None:
+def _ignore_progress() -> None:
     """Ignore the report of progress."""
 
 
@@ -65,14 +65,14 @@ class Process:
         try:
             _write(self._questions, message)
         except OSError as error:
-            raise _gone(error) from error
+            raise _worker_gone(error) from error
 
     def answer(self) -> Any:
         """Wait for the next answer. Raises :class:`MethodFailed` if the process has ended."""
         try:
             return pickle.loads(_read(self._answers))
         except (EOFError, OSError) as error:
-            raise _gone(error) from error
+            raise _worker_gone(error) from error
 
     def end(self) -> None:
         """Kill the process, busy or not."""
@@ -86,7 +86,9 @@ class Workers:
     def __init__(self, processes: list[Process]) -> None:
         self._processes = processes
 
-    def call(self, method: str, *arguments: Sequence[Any], done: Done = _unheard) -> list[Any]:
+    def call(
+        self, method: str, *arguments: Sequence[Any], done: Done = _ignore_progress
+    ) -> list[Any]:
         """Call a method of every worker, each with its share of the ``arguments``.
 
         ``done`` is called whenever a worker reports that a part is done. Once all have answered, an
@@ -95,7 +97,7 @@ class Workers:
         return self.begin(method, *arguments, done=done)()
 
     def begin(
-        self, method: str, *arguments: Sequence[Any], done: Done = _unheard
+        self, method: str, *arguments: Sequence[Any], done: Done = _ignore_progress
     ) -> Callable[[], list[Any]]:
         """Begin such a call; return a function that waits for the answers and raises as it does.
 
@@ -149,13 +151,16 @@ class WorkerProcess:
 
 
 def share_out(
-    tasks: Sequence[Task], beside: WorkerProcess | None = None, done: Done = _unheard, own: int = 0
+    tasks: Sequence[Task],
+    worker: WorkerProcess | None = None,
+    done: Done = _ignore_progress,
+    own: int = 0,
 ) -> list[Any]:
-    """Do tasks here from the first onwards, and in the process ``beside`` from the last backwards.
+    """Do tasks here from the first onwards, and in the process ``worker`` from the last backwards.
 
     The first ``own`` tasks are done here in any case. ``done`` is called after each task. Returns
     the results of the tasks. Raises the exception of a task; if a task here raised it, or after
-    Ctrl-C, the process ``beside`` is ended at once.
+    Ctrl-C, the process ``worker`` is ended at once.
     """
     answers: list[Any] = [None] * len(tasks)
     first, left = deque(range(own)), deque(range(own, len(tasks)))
@@ -174,16 +179,16 @@ def share_out(
         for numbers in (first, left):
             work(numbers.popleft, lambda function, *arguments: function(*arguments))
 
-    if beside is None:
+    if worker is None:
         here()
         return answers
     with ThreadPoolExecutor(1) as pool:
-        there = pool.submit(work, left.pop, lambda *task: beside.begin(*task)())
+        there = pool.submit(work, left.pop, lambda *task: worker.begin(*task)())
         try:
             here()
         except BaseException:
             left.clear()
-            beside.close()
+            worker.close()
             raise
         there.result()
     return answers
@@ -225,24 +230,24 @@ class _Hearing:
     def __init__(self, process: Process, done: Done) -> None:
         self._process, self._done = process, done
         self._answer: Any = None
-        self._gone: Exception | None = None
+        self._worker_gone: Exception | None = None
         # Not a thread of a pool, so that Ctrl-C does not wait for it.
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
 
     def _listen(self) -> None:
         try:
-            while isinstance(said := self._process.answer(), _Done):
+            while isinstance(printed := self._process.answer(), _Done):
                 self._done()
-            self._answer = said
+            self._answer = printed
         except Exception as error:
-            self._gone = error
+            self._worker_gone = error
 
     def answer(self) -> Any:
         """Wait for the answer and return it."""
         self._thread.join()
-        if self._gone is not None:
-            raise self._gone
+        if self._worker_gone is not None:
+            raise self._worker_gone
         return self._answer
 
 
@@ -255,7 +260,7 @@ def _answers(hearings: list[_Hearing]) -> list[Any]:
     return answers
 
 
-def _gone(error: Exception) -> MethodFailed:
+def _worker_gone(error: Exception) -> MethodFailed:
     return MethodFailed(
         f"a process of the run is gone ({type(error).__name__}): did it run out of memory?"
     )

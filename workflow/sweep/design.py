@@ -152,7 +152,7 @@ def _stepped(sweep: Sweep) -> dict[str, list[Any]]:
     """Return runs with each independent normal number at the ends of its 95 %, and all at once."""
     known = sweep.fitted or FittedSample((), np.eye(0))
     varied = sweep.file.variations().items()
-    known = known.beside([_normal(name, variation.distribution) for name, variation in varied])
+    known = known.with_others([_normal(name, variation.distribution) for name, variation in varied])
     return known.given(positions(len(known.parameters)))
 
 

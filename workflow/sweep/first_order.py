@@ -70,7 +70,7 @@ class FirstOrder:
         """Error of one number over half the width of its band; None if the band has no width."""
         return float(self.error / self.half) if self.half > self._still else None
 
-    def told(self) -> dict[str, object] | None:
+    def reported(self) -> dict[str, object] | None:
         """Return the band of one number with the error of its sides; None if it is not linear."""
         if not self.linear:
             return None

@@ -92,7 +92,7 @@ class FittedSample:
             for entry in parameter.entries
         }
 
-    def beside(self, others: Sequence[DrawnParameter]) -> FittedSample:
+    def with_others(self, others: Sequence[DrawnParameter]) -> FittedSample:
         """Return a sample with further parameters, which are uncorrelated with all others."""
         here, count = len(self.parameters), len(self.parameters) + len(others)
         correlation = np.eye(count)
@@ -108,8 +108,10 @@ def read_fit(path: Path) -> FittedSample:
     """
     try:
         summary = json.loads(read_text(path))
-        told = summary["parameters"]
-        parameters = [_parameter(name, told[name]) for name in told if told[name]["entries"]]
+        reported = summary["parameters"]
+        parameters = [
+            _parameter(name, reported[name]) for name in reported if reported[name]["entries"]
+        ]
         names, matrix = summary["correlation"]["parameters"], summary["correlation"]["matrix"]
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         if isinstance(error, UserError):
@@ -123,20 +125,20 @@ def read_fit(path: Path) -> FittedSample:
     return FittedSample(tuple(parameters), _correlation(matrix, here))
 
 
-def _parameter(name: str, told: Mapping[str, Any]) -> DrawnParameter:
-    if not told["determined"]:
+def _parameter(name: str, reported: Mapping[str, Any]) -> DrawnParameter:
+    if not reported["determined"]:
         raise UserError(
-            f"{name}: not determined by the fit ({told['doubt']}); allowed: a fit that holds it"
+            f"{name}: not determined by the fit ({reported['doubt']}); allowed: a fit that holds it"
         )
-    lower, upper = told["allowed"]
+    lower, upper = reported["allowed"]
     return DrawnParameter(
         name,
-        float(told["value"]),
-        str(told["unit"]),
-        (float(told["bounds"][0]), float(told["bounds"][1])),
+        float(reported["value"]),
+        str(reported["unit"]),
+        (float(reported["bounds"][0]), float(reported["bounds"][1])),
         (-math.inf if lower is None else lower, math.inf if upper is None else upper),
-        bool(told["fitted_as_logarithm"]),
-        tuple(told["entries"]),
+        bool(reported["fitted_as_logarithm"]),
+        tuple(reported["entries"]),
     )
 
 

@@ -21,7 +21,7 @@ from workflow.errors import CaseError, UserError
 from workflow.kinds import analysis_of
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
-from workflow.runs.run import kept_in
+from workflow.runs.run import stored_run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.lock import locked
 from workflow.shell.folders.store import write_text
@@ -94,7 +94,7 @@ def _check_runs(sweep: Sweep, runs: Sequence[SweepRun], out: Path, force: bool) 
         except CaseError as error:
             wrong |= dict.fromkeys(_explained(sweep, run.job(sweep), str(error)))
             continue
-        states.append(kept_in(out / run.name, case))
+        states.append(stored_run(out / run.name, case))
         if states[-1] == "other" and not force:
             raise UserError(
                 f"{out / run.name}: holds a run of another case; give another folder, or --force"
@@ -142,8 +142,8 @@ def _run(
         ended[finished.job.name] = finished
         how = f"failed: {finished.error}" if finished.error else "done"
         spent = time.perf_counter() - begin
-        told = f"  {len(ended)}/{len(jobs)}, {spent:.0f} s: {finished.job.name}: {how}"
-        reporter.say(told, always=bool(finished.error))
+        reported = f"  {len(ended)}/{len(jobs)}, {spent:.0f} s: {finished.job.name}: {how}"
+        reporter.say(reported, always=bool(finished.error))
         reporter.reached(len(ended) / len(jobs), f"{len(ended)} of {len(jobs)}")
         if len(ended) <= finished_before:
             reporter.goes_on()
@@ -206,7 +206,7 @@ def _stepped(values: Array) -> dict[str, Any] | None:
     if not np.all(np.isfinite(values)):
         return {"best": float(values[0]), "band": None, "bent": None}
     found = first_order(values)
-    return {"best": float(found.middle), "band": found.told(), "bent": found.bent}
+    return {"best": float(found.middle), "band": found.reported(), "bent": found.bent}
 
 
 def _lacking(sweep: Sweep, rows: Sequence[SweepRow]) -> str:

@@ -289,7 +289,7 @@ def _disagreements(sweep: Sweep) -> Iterator[str]:
     file, varied = sweep.file, sweep.file.variations()
     place = sweep.source.where
     yield from _without_variation(sweep)
-    yield from _beside_a_fit(sweep)
+    yield from _conflicts_with_fit(sweep)
     for name in varied.keys() & file.set.keys():
         yield f"{place(('set', name))[1]}: set.{name}: varies as well; allowed: one of them"
     if (file.design == "sample") != (file.samples is not None):
@@ -315,7 +315,7 @@ def _without_variation(sweep: Sweep) -> Iterator[str]:
         yield f"{where}: missing; allowed: what each entry is given, or fit"
 
 
-def _beside_a_fit(sweep: Sweep) -> Iterator[str]:
+def _conflicts_with_fit(sweep: Sweep) -> Iterator[str]:
     """Yield lines about entries that contradict the fit."""
     if sweep.fitted is None:
         return

@@ -18,7 +18,7 @@ from fe_models.dynamics.periodic.harmonic_balance import (
 )
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution, ResolutionError
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
-from fe_models.dynamics.periodic.resolution_error import resolution_error, richer_problem
+from fe_models.dynamics.periodic.resolution_error import extended_problem, resolution_error
 from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
@@ -251,7 +251,7 @@ class BranchRecorder:
         return None
 
     def _refine(self, finer: Resolution) -> Refinement[Balance]:
-        coarse, self.problem = self.problem.resolution, self.problem.refined(finer)
+        coarse, self.problem = self.problem.resolution, self.problem.with_resolution(finer)
         size = coarse.size, self.problem.joints.directions
 
         def lift(unknowns: Array) -> Array:
@@ -268,7 +268,7 @@ def finer_for(
         return None
     # When the error was estimated in an earlier run, the richer problem grew; it must grow here
     # too.
-    richer_problem(problem, motion)
+    extended_problem(problem, motion)
     return finer_resolution(problem.resolution, motion.error, accuracy)
 
 

@@ -31,7 +31,7 @@ from fe_models.dynamics.curves.newton import NewtonControl, solve
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError
-from fe_models.dynamics.periodic.resolution_error import richer_problem
+from fe_models.dynamics.periodic.resolution_error import extended_problem
 from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
@@ -474,7 +474,7 @@ class _ModeRecorder:
         vibration = problem.vibration(motion.coefficients)
         if vibration == 0.0:
             return 0.0, 0.0, 0.0
-        richer = replace(self.equations, problem=richer_problem(problem, motion))
+        richer = replace(self.equations, problem=extended_problem(problem, motion))
         joints = richer.problem.resolution.adopt(motion.coefficients, problem.resolution)
         at = richer(np.append(joints, point.unknowns[-2:]), point.parameter)
         change = solve_alone(at.jacobian, -at.residual)

@@ -355,7 +355,7 @@ class _BackboneRecorder:
     def _refine(self, finer: Resolution) -> Refinement[PhaseBalance]:
         problem = self.equations.problem
         coarse, directions = problem.resolution, problem.joints.directions
-        self.equations = replace(self.equations, problem=problem.refined(finer))
+        self.equations = replace(self.equations, problem=problem.with_resolution(finer))
 
         def lift(unknowns: Array) -> Array:
             joints = unknowns[:-1].reshape(-1, coarse.size, directions)

@@ -178,7 +178,7 @@ class HarmonicBalance:
         if load.static is not None and np.any(load.static):
             self._constant[0] = load.static @ self.receptance.of(0).at_points
         self.rest = rest or Rest(model, self.receptance.of(0), joints, self._constant[0].real)
-        self._richer: HarmonicBalance | None = None
+        self._extended: HarmonicBalance | None = None
 
     @classmethod
     def of_sector(
@@ -394,25 +394,25 @@ class HarmonicBalance:
         size = norm(self.without_mean(coefficients))
         return size if size > self.rounding else 0.0
 
-    def refined(self, resolution: Resolution) -> HarmonicBalance:
+    def with_resolution(self, resolution: Resolution) -> HarmonicBalance:
         """Return the same problem at another resolution."""
         return HarmonicBalance(
             self.model, self.joints, self.load, resolution, self.receptance, self.rest
         )
 
-    def richer(self, harmonics: set[int]) -> HarmonicBalance:
+    def with_harmonics(self, harmonics: set[int]) -> HarmonicBalance:
         """Return the same problem with further harmonics, and at least twice the samples.
 
         The result is cached and contains the harmonics of all earlier calls.
         """
-        known = () if self._richer is None else self._richer.resolution.harmonics
-        if self._richer is None or not harmonics <= set(known):
+        known = () if self._extended is None else self._extended.resolution.harmonics
+        if self._extended is None or not harmonics <= set(known):
             every = tuple(sorted({*self.resolution.harmonics, *known, *harmonics}))
             samples = 2 * self.resolution.samples
             while samples < SAMPLES_PER_PERIOD * every[-1]:
                 samples *= 2
-            self._richer = self.refined(Resolution(every, samples))
-        return self._richer
+            self._extended = self.with_resolution(Resolution(every, samples))
+        return self._extended
 
     def evaluate(
         self,

@@ -38,43 +38,43 @@ def resolution_error(problem: HarmonicBalance, solution: HarmonicSolution) -> Re
     vibration = problem.vibration(solution.coefficients)
     if vibration == 0.0:
         return ResolutionError(0.0, 0.0, np.zeros(1), 0.0)
-    richer = richer_problem(problem, solution)
-    coefficients = richer.resolution.adopt(solution.coefficients, problem.resolution)
-    at = richer.evaluate(coefficients.ravel(), solution.frequency, solution.force, "frequency")
-    change, share, distance = _step_to_nearest(richer, at, solution.frequency, vibration)
-    energy = _energy_error(richer, solution, coefficients.ravel() + change, share)
-    by_harmonic, sampling = _contributions(problem.resolution, richer, at)
+    extended = extended_problem(problem, solution)
+    coefficients = extended.resolution.adopt(solution.coefficients, problem.resolution)
+    at = extended.evaluate(coefficients.ravel(), solution.frequency, solution.force, "frequency")
+    change, share, distance = _step_to_nearest(extended, at, solution.frequency, vibration)
+    energy = _energy_error(extended, solution, coefficients.ravel() + change, share)
+    by_harmonic, sampling = _contributions(problem.resolution, extended, at)
     scale = max(distance, energy) / (float(np.hypot(np.linalg.norm(by_harmonic), sampling)) or 1.0)
     return ResolutionError(distance, energy, scale * by_harmonic, scale * sampling)
 
 
-def richer_problem(problem: HarmonicBalance, solution: HarmonicSolution) -> HarmonicBalance:
+def extended_problem(problem: HarmonicBalance, solution: HarmonicSolution) -> HarmonicBalance:
     """Return the problem with the harmonics that a motion neglects.
 
     It also has the harmonics that earlier motions of the same problem neglected. A caller that uses
     a stored error must call this function for its motion too, so that later results are the same.
     """
-    return problem.richer(set(np.flatnonzero(solution.shares > EXAMINED_SHARE).tolist()))
+    return problem.with_harmonics(set(np.flatnonzero(solution.shares > EXAMINED_SHARE).tolist()))
 
 
 def _energy_error(
-    richer: HarmonicBalance, solution: HarmonicSolution, unknowns: Array, share: float
+    extended: HarmonicBalance, solution: HarmonicSolution, unknowns: Array, share: float
 ) -> float:
     """Return the error of the joints' energy over all energy lost, from the nearest motion.
 
     That motion has the given ``unknowns``, and a frequency larger by the factor 1 + ``share``.
     """
     frequency = solution.frequency * (1.0 + share)
-    nearest = richer.evaluate(unknowns, frequency, solution.force, "frequency")
+    nearest = extended.evaluate(unknowns, frequency, solution.force, "frequency")
     dissipated = float(nearest.cycle.dissipated.sum())
-    motion = richer.transfer.displacement(nearest.motion)
-    damped = energy_damped(richer, motion, richer.resolution.harmonics, frequency)
+    motion = extended.transfer.displacement(nearest.motion)
+    damped = energy_damped(extended, motion, extended.resolution.harmonics, frequency)
     difference = abs(dissipated - float(solution.cycle.dissipated.sum()))
     return difference / (dissipated + damped) if difference > 0.0 else 0.0
 
 
 def _step_to_nearest(
-    richer: HarmonicBalance, at: Balance, frequency: float, vibration: float
+    extended: HarmonicBalance, at: Balance, frequency: float, vibration: float
 ) -> tuple[Array, float, float]:
     """Return the step ``(n,)`` [mm] to the nearest motion, its relative frequency, and its size.
 
@@ -84,7 +84,7 @@ def _step_to_nearest(
     """
     sides = -np.stack([at.residual, frequency * at.slope], axis=1)
     change, slope = solve_alone(at.jacobian, sides, LINEAR_TOLERANCE).T
-    by_residual, by_slope = (richer.without_mean(rows) / vibration for rows in (change, slope))
+    by_residual, by_slope = (extended.without_mean(rows) / vibration for rows in (change, slope))
     share = -float(by_residual @ by_slope) / (float(by_slope @ by_slope) + STEEPEST_RESPONSE**2)
     size = float(
         np.hypot(np.linalg.norm(by_residual + share * by_slope), STEEPEST_RESPONSE * share)
@@ -92,11 +92,13 @@ def _step_to_nearest(
     return change + share * slope, share, size
 
 
-def _contributions(coarse: Resolution, richer: HarmonicBalance, at: Balance) -> tuple[Array, float]:
+def _contributions(
+    coarse: Resolution, extended: HarmonicBalance, at: Balance
+) -> tuple[Array, float]:
     """Return the residual norm of each neglected harmonic, and that of all kept harmonics."""
-    rows = richer.transfer.shaped(at.residual)
-    sizes = np.zeros(richer.resolution.harmonics[-1] + 1)
-    sizes[list(richer.resolution.harmonics)] = richer.resolution.sizes(rows)
+    rows = extended.transfer.shaped(at.residual)
+    sizes = np.zeros(extended.resolution.harmonics[-1] + 1)
+    sizes[list(extended.resolution.harmonics)] = extended.resolution.sizes(rows)
     kept = list(coarse.harmonics)
     sampling = float(np.linalg.norm(sizes[kept]))
     sizes[kept] = 0.0

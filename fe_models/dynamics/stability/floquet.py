@@ -174,7 +174,7 @@ class Floquet:
         return self._reduced
 
     @property
-    def cheap(self) -> bool:
+    def is_fast(self) -> bool:
         """True if the analysis of a motion takes milliseconds; otherwise it may take seconds."""
         modes, directions = (
             self._sectors * len(part)
@@ -198,7 +198,7 @@ class Floquet:
                 f"{MOST_OF_RING}"
             )
         structure = self._structure(motion)
-        samples = SAMPLES if self.cheap else LARGE_SAMPLES
+        samples = SAMPLES if self.is_fast else LARGE_SAMPLES
         while samples < SAMPLES_PER_HARMONIC * motion.resolution.harmonics[-1]:
             samples *= 2
         few_modes = len(structure.squares) <= MOST_MODES
@@ -211,8 +211,8 @@ class Floquet:
 
         Where a curve of such motions folds, one of the multipliers is 1.
         """
-        samples = SPLIT**REFINEMENTS * SAMPLES if self.cheap else LARGE_SAMPLES
-        times = self._times(motion, samples, DEEPEST if self.cheap else 0)
+        samples = SPLIT**REFINEMENTS * SAMPLES if self.is_fast else LARGE_SAMPLES
+        times = self._times(motion, samples, DEEPEST if self.is_fast else 0)
         deviations, structure = self._deviations(motion, times), self._structure(motion)
         joints = ActiveJoints.of(deviations, structure)
         period = period_map(structure, motion.frequency, times, deviations, joints)
@@ -255,7 +255,7 @@ class Floquet:
     ) -> Stability:
         """Return the stability of a motion as given by its harmonics."""
         # With many joints, one changes in every step: no step is divided.
-        refinements, deepest = (REFINEMENTS, DEEPEST) if self.cheap else (0, 0)
+        refinements, deepest = (REFINEMENTS, DEEPEST) if self.is_fast else (0, 0)
         for refinement in range(refinements + 1):
             times = self._times(motion, SPLIT**refinement * samples, deepest + refinement)
             half = times.halved()

@@ -188,19 +188,19 @@ def integrate(
         )
         allowed = control.tolerance * rough_run.largest_displacement
     march = _March(model, law, excite, control.step, begin, allowed)
-    companion_allowed = TWICE_AS_LONG * allowed
-    companion_start = replace(begin.companion or begin, time=begin.time)
-    companion = _March(model, law, excite, 2.0 * control.step, companion_start, companion_allowed)
+    coarse_run_allowed = TWICE_AS_LONG * allowed
+    coarse_start = replace(begin.coarse_run or begin, time=begin.time)
+    coarse_run = _March(model, law, excite, 2.0 * control.step, coarse_start, coarse_run_allowed)
     record = _march_blocks(
         march,
-        companion,
+        coarse_run,
         count,
         control.every,
         steps,
         lambda share: reached(first_share + (1.0 - first_share) * share),
     )
-    in_step = march.taken == 2 * companion.taken and count % control.every == 0
-    return record.motion(march.message or companion.message, companion.end if in_step else None)
+    in_step = march.taken == 2 * coarse_run.taken and count % control.every == 0
+    return record.motion(march.message or coarse_run.message, coarse_run.end if in_step else None)
 
 
 @dataclass(frozen=True)
@@ -450,7 +450,7 @@ class _March:
 
 def _march_blocks(
     march: _March,
-    companion: _March | None,
+    coarse_run: _March | None,
     count: int,
     every: int,
     steps: Steps,
@@ -462,7 +462,7 @@ def _march_blocks(
     ----------
     march
         The march.
-    companion
+    coarse_run
         March with steps of twice the length that follows, or None.
     count
         Number of whole steps.
@@ -472,12 +472,12 @@ def _march_blocks(
         As in :func:`integrate`.
     """
     record = MotionRecord(march.model, march.directions, every, march.at)
-    marches = [march] if companion is None else [march, companion]
+    marches = [march] if coarse_run is None else [march, coarse_run]
 
     def block() -> tuple[RecordedSteps | None, list[_MarchState]]:
         points = march.block(min(BLOCK_STEPS, count - march.taken))
-        companion_points = companion.block(march.taken // 2 - companion.taken) if companion else []
-        return record.recorded(points, companion_points), [each.state for each in marches]
+        coarse_points = coarse_run.block(march.taken // 2 - coarse_run.taken) if coarse_run else []
+        return record.recorded(points, coarse_points), [each.state for each in marches]
 
     while march.taken < count and not any(each.message for each in marches):
         recorded, states = steps("steps in time", block)

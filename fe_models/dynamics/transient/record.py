@@ -18,7 +18,7 @@ from sa_solver.types import Array
 # Distance of the companion run, with steps of twice the length, over the error. The ratio is 2² - 1
 # = 3 for errors of second order, and 1 where permanent slip depends on a mode that the steps do not
 # resolve. With a value in between, both are estimated within a factor of three.
-COMPANION_RATIO = 2.0
+COARSE_STEP_RATIO = 2.0
 
 
 class StepState(NamedTuple):
@@ -72,7 +72,7 @@ class RecordedSteps:
         Number of whole steps.
     points
         Number of steps, divided ones included.
-    companion_distance
+    distance_to_coarse_run
         Largest distance from the companion run, as half a squared norm.
     step_error
         Largest error that one step adds, as half a squared norm.
@@ -88,7 +88,7 @@ class RecordedSteps:
     kept: StepState
     whole_steps: int
     points: int
-    companion_distance: float
+    distance_to_coarse_run: float
     step_error: float
     largest_displacement: float
     residual: float
@@ -114,16 +114,16 @@ class MotionRecord:
         self._last_point, self._kept = first, first
         sums = np.zeros((1, 3 + len(model.connection) // directions))
         self._sums, self._rows = sums[0], [(*_columns([first]), sums)]
-        self._companion_distance = self._largest_step_error = 0.0
+        self._distance_to_coarse_run = self._largest_step_error = 0.0
         self._largest_motion = self._residual = 0.0
         self._taken = self._steps = 0
 
     def recorded(
-        self, block: list[list[StepState]], companion: list[list[StepState]]
+        self, block: list[list[StepState]], coarse_run: list[list[StepState]]
     ) -> RecordedSteps | None:
         """Return the contribution of whole steps to the record; None if there are none.
 
-        ``block`` has the points of each whole step, and ``companion`` those of the companion run,
+        ``block`` has the points of each whole step, and ``coarse_run`` those of the companion run,
         one step of it for two of these.
         """
         points = [point for step_points in block for point in step_points]
@@ -142,7 +142,7 @@ class MotionRecord:
             kept=points[kept[-1]] if len(kept) else self._kept,
             whole_steps=len(block),
             points=len(points),
-            companion_distance=self._distance(block[1::2], companion),
+            distance_to_coarse_run=self._distance(block[1::2], coarse_run),
             step_error=step_error,
             largest_displacement=self._largest(np.array([point.motion for point in points])),
             residual=max(point.residual for point in points),
@@ -155,14 +155,16 @@ class MotionRecord:
         self._last_point, self._kept, self._sums = recorded.last, recorded.kept, recorded.sums
         self._taken += recorded.whole_steps
         self._steps += recorded.points
-        self._companion_distance = max(self._companion_distance, recorded.companion_distance)
+        self._distance_to_coarse_run = max(
+            self._distance_to_coarse_run, recorded.distance_to_coarse_run
+        )
         self._largest_step_error = max(self._largest_step_error, recorded.step_error)
         self._largest_motion = max(self._largest_motion, recorded.largest_displacement)
         self._residual = max(self._residual, recorded.residual)
 
-    def _distance(self, block: list[list[StepState]], companion: list[list[StepState]]) -> float:
+    def _distance(self, block: list[list[StepState]], coarse_run: list[list[StepState]]) -> float:
         """Return the largest distance between two runs at equal times, as half a squared norm."""
-        pairs = zip(block, companion, strict=False)
+        pairs = zip(block, coarse_run, strict=False)
         differences = [step_points[-1].motion - other[-1].motion for step_points, other in pairs]
         return self._largest(np.array(differences)) if differences else 0.0
 
@@ -200,10 +202,10 @@ class MotionRecord:
         """Largest displacement, as a norm weighted by mass [t^0.5 mm]."""
         return float(np.sqrt(2.0 * self._largest_motion))
 
-    def motion(self, message: str, companion: Start | None) -> Motion:
+    def motion(self, message: str, coarse_run: Start | None) -> Motion:
         """Return the motion from all recorded rows.
 
-        ``message`` says why the integration stopped early, or is empty. ``companion`` is the state
+        ``message`` says why the integration stopped early, or is empty. ``coarse_run`` is the state
         of the companion run at the last row.
         """
         model, directions = self._model, self._directions
@@ -212,7 +214,9 @@ class MotionRecord:
         )
         displacement, velocity = np.split(motion, 2, axis=1)
         shape = (len(motion), len(model.connection) // directions, directions)
-        error_square = max(self._companion_distance / COMPANION_RATIO**2, self._largest_step_error)
+        error_square = max(
+            self._distance_to_coarse_run / COARSE_STEP_RATIO**2, self._largest_step_error
+        )
         largest_square = self._largest_motion
         return Motion(
             times=times,
@@ -222,7 +226,7 @@ class MotionRecord:
             joint_displacement=(displacement @ model.connection.T).reshape(shape),
             joint_force=joint_force.reshape(shape),
             joint_state=self._kept.response.state,
-            companion=companion,
+            coarse_run=coarse_run,
             energies=Energies(
                 kinetic=quadratic(model.mass, velocity),
                 elastic=quadratic(model.stiffness, displacement),

@@ -49,7 +49,7 @@ def read_abaqus(path: Path) -> GroupedMesh:
     caveats = [*_plane_stress(scopes), *_stiff_edges(model)]
     scene = scene_of(model, flattened, mesh)
     scene = replace(scene, ignored=(*caveats, *scene.ignored))
-    return replace(mesh, left=(*caveats, *model.left), scene=scene)
+    return replace(mesh, unused=(*caveats, *model.unused), scene=scene)
 
 
 def _plane_stress(scopes: list[Scope]) -> list[str]:

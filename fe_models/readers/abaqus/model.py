@@ -52,7 +52,7 @@ class Model:
         self.assembly = Scope("", SourceLine(path, 1))
         self.parts: Names[Scope] = Names()
         self.instances: Names[Scope] = Names()
-        self.left: list[str] = []
+        self.unused: list[str] = []
         # Keywords that a case has to describe, with their scope, and the part of each instance.
         self.case_cards: list[tuple[Scope, Card]] = []
         self.part_of: dict[str, str] = {}
@@ -78,7 +78,7 @@ class Model:
                 f"{card.place}: *{card.keyword} is not supported: {REFUSED[card.keyword]}"
             )
         if card.keyword in LEFT:
-            self.left.append(summary_line(card))
+            self.unused.append(summary_line(card))
         if card.keyword in LEFT | CONTEXT:
             self.case_cards.append((self._scope, card))
         if card.keyword in self._handlers:

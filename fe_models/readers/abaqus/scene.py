@@ -19,10 +19,10 @@ from fe_models.readers.abaqus.model import Model, summary_line
 from fe_models.readers.flattened import Flattened
 from fe_models.readers.grouped import GroupedMesh
 from fe_models.readers.scene import (
+    FileContact,
+    FileLoad,
+    FileSupport,
     NotTakenError,
-    SaidContact,
-    SaidLoad,
-    SaidSupport,
     Scene,
     Vector,
 )
@@ -68,8 +68,8 @@ class _Reader:
         self.friction: dict[str, float] = {}
         self.sections: list[tuple[Scope, Card]] = []
         self.pairs: list[tuple[tuple[str, str], str, str]] = []
-        self.supports: list[SaidSupport] = []
-        self.loads: dict[tuple[str, str, str], SaidLoad] = {}
+        self.supports: list[FileSupport] = []
+        self.loads: dict[tuple[str, str, str], FileLoad] = {}
         self.factors: dict[tuple[str, str, str], dict[int, float]] = {}
         self.ended: set[tuple[int, str]] = set()
         self.ignored: list[str] = []
@@ -102,7 +102,7 @@ class _Reader:
             except WRONG as error:
                 self.ignored.append(_ignored(card, error))
         contacts = [
-            SaidContact(faces, self.friction.get(interaction.upper()), line)
+            FileContact(faces, self.friction.get(interaction.upper()), line)
             for faces, interaction, line in self.pairs
         ]
         return Scene(
@@ -260,7 +260,7 @@ class _Reader:
             return
         if self.step > 1:
             self.ignored.append(f"{line}: {group} is held from the beginning, not from there")
-        self.supports.append(SaidSupport(group, held, line))
+        self.supports.append(FileSupport(group, held, line))
 
     def _force(self, card: Card, row: DataLine, line: str) -> None:
         group = self._group(row.fields[0])
@@ -316,7 +316,7 @@ class _Reader:
         if not size and key not in self.loads:
             return
         value = size if along is None else _times(along, size)
-        first = self.loads.setdefault(key, SaidLoad(kind, group, value, (), line, through))
+        first = self.loads.setdefault(key, FileLoad(kind, group, value, (), line, through))
         factor = _ratio(value, first.value)
         if factor is None:
             raise NotTakenError("along another direction than before")
@@ -336,7 +336,7 @@ class _Reader:
         if card.keyword == "BOUNDARY" and self.supports:
             self.ignored.append(_ignored(card, "what is held stays held, through all steps"))
 
-    def _load_paths(self) -> Iterator[SaidLoad]:
+    def _load_paths(self) -> Iterator[FileLoad]:
         """Yield the loads with their factors at the end of every step.
 
         A load stays until it changes.

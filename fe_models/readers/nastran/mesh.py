@@ -53,10 +53,10 @@ def read_nastran(path: Path) -> GroupedMesh:
         raise MeshError(f"{path}: has no elements that are read: {', '.join(SOLIDS)}")
     flat = FlatFile(read.scope, joins=True)
     mesh = flat.mesh()
-    scene, caveats = scene_of(read.entries, mesh, read.left), (*read.caveats, *flat.notes)
+    scene, caveats = scene_of(read.entries, mesh, read.unused), (*read.caveats, *flat.notes)
     return replace(
         mesh,
-        left=(*map(summary_line, read.left), *caveats),
+        unused=(*map(summary_line, read.unused), *caveats),
         scene=replace(scene, ignored=(*scene.ignored, *caveats)),
     )
 
@@ -66,7 +66,10 @@ class _Read:
 
     def __init__(self, path: Path, data: BulkData) -> None:
         self.scope = Scope("", SourceLine(path, 1))
-        self.entries, self.left = data.entries, [e for e in data.entries if LEFT.fullmatch(e.name)]
+        self.entries, self.unused = (
+            data.entries,
+            [e for e in data.entries if LEFT.fullmatch(e.name)],
+        )
         # Notes on properties that bodies do not have: stiffness of shells, and plane stress.
         self.caveats: list[str] = []
         self._names = _property_names(data.comments)

@@ -16,7 +16,7 @@ from fe_models.readers.grouped import GroupedMesh
 from fe_models.readers.nastran.cards import BulkEntry, summary_line
 from fe_models.readers.nastran.elements import SOLIDS
 from fe_models.readers.nastran.groups import axes_of, held_name
-from fe_models.readers.scene import NotTakenError, SaidContact, SaidLoad, SaidSupport, Scene
+from fe_models.readers.scene import FileContact, FileLoad, FileSupport, NotTakenError, Scene
 
 # Reason to ignore supports and forces along the axes of another coordinate system.
 LOCAL = "along the axes of another coordinate system"
@@ -39,9 +39,9 @@ class _Reader:
             self.of.setdefault(entry.name, []).append(entry)
         # Grid points whose displacements are along the axes of another system.
         self.local = {e.whole(0) for e in self.of.get("GRID", []) if e.text(5) not in ("", "0")}
-        self.contacts: list[SaidContact] = []
-        self.supports: list[SaidSupport] = []
-        self.loads: list[SaidLoad] = []
+        self.contacts: list[FileContact] = []
+        self.supports: list[FileSupport] = []
+        self.loads: list[FileLoad] = []
         self.forces: dict[str, list[tuple[BulkEntry, np.ndarray]]] = {}
         self.pressures: dict[str, list[tuple[BulkEntry, float]]] = {}
         self.ignored: list[str] = []
@@ -122,7 +122,7 @@ class _Reader:
                 continue
             source, target = (self._surface(entry.text(first + k)) for k in (0, 1))
             friction = entry.real(first + 2) if entry.text(first + 2) else None
-            self.contacts.append(SaidContact((source, target), friction, entry.place.short))
+            self.contacts.append(FileContact((source, target), friction, entry.place.short))
 
     def _surface(self, number: str) -> str:
         for kind in ("bsurfs", "bsurf"):
@@ -150,7 +150,7 @@ class _Reader:
         if self.local.intersection(self.mesh.numbers[self.mesh.node_sets[group]].tolist()):
             raise NotTakenError(LOCAL)
         if all(support.group != group for support in self.supports):
-            self.supports.append(SaidSupport(group, axes, entry.place.short))
+            self.supports.append(FileSupport(group, axes, entry.place.short))
 
     def _force(self, entry: BulkEntry) -> None:
         if entry.text(2) not in ("", "0"):
@@ -158,7 +158,7 @@ class _Reader:
         vector = entry.real(3) * np.array([entry.real(k) for k in (4, 5, 6)])
         self.forces.setdefault(f"force_{entry.text(0)}", []).append((entry, vector))
 
-    def _total_forces(self) -> Iterator[SaidLoad]:
+    def _total_forces(self) -> Iterator[FileLoad]:
         """Yield the sum of the forces of each set."""
         for group, forces in self.forces.items():
             vectors = np.array([vector for _, vector in forces])
@@ -166,7 +166,7 @@ class _Reader:
             place = forces[0][0].place.short
             if np.ptp(vectors, axis=0).any():
                 self.ignored.append(f"{place}: forces of {group} that differ: their sum is taken")
-            yield SaidLoad("force", group, (x, y, z), (1.0,), place)
+            yield FileLoad("force", group, (x, y, z), (1.0,), place)
 
     def _pressure(self, entry: BulkEntry) -> None:
         size = entry.real(2)
@@ -177,21 +177,21 @@ class _Reader:
             raise NotTakenError("a traction along a vector: give it as a force")
         self.pressures.setdefault(f"pload4_{entry.text(0)}", []).append((entry, size))
 
-    def _even_pressures(self) -> Iterator[SaidLoad]:
+    def _even_pressures(self) -> Iterator[FileLoad]:
         """Yield the pressure of each set if it is the same everywhere."""
         for group, pressures in self.pressures.items():
             entry, size = pressures[0]
             if any(value != size for _, value in pressures):
                 self.ignored.append(f"{summary_line(entry)}: the pressures of its set differ")
                 continue
-            yield SaidLoad("pressure", group, size, (1.0,), entry.place.short)
+            yield FileLoad("pressure", group, size, (1.0,), entry.place.short)
 
     def _gravity(self, entry: BulkEntry) -> None:
         if entry.text(1) not in ("", "0"):
             raise NotTakenError(LOCAL)
         # Inertia forces on bodies are opposite to the acceleration of their frame.
         x, y, z = (-entry.real(2) * entry.real(k) for k in (3, 4, 5))
-        self.loads.append(SaidLoad("acceleration", "", (x, y, z), (1.0,), entry.place.short))
+        self.loads.append(FileLoad("acceleration", "", (x, y, z), (1.0,), entry.place.short))
 
     def _rotation(self, entry: BulkEntry) -> None:
         if entry.text(2) not in ("", "0"):
@@ -202,7 +202,7 @@ class _Reader:
         axis = [2.0 * math.pi * entry.real(3) * entry.real(k) for k in (4, 5, 6)]
         x, y, z = axis
         a, b, c = through
-        self.loads.append(SaidLoad("rotation", "", (x, y, z), (1.0,), entry.place.short, (a, b, c)))
+        self.loads.append(FileLoad("rotation", "", (x, y, z), (1.0,), entry.place.short, (a, b, c)))
 
 
 def _constants(entry: BulkEntry) -> dict[str, float]:

@@ -300,7 +300,7 @@ def strips(request, dovetail):
     """Return a line face, strips that cover it and extend beyond it, and their transfer."""
     face = dovetail.mesh((NODES, 2), SIZE, 2).interfaces[request.param]
     assert face.line
-    grid = Grid.strips(dovetail.flank_size()[0] * 1.1, 37)
+    grid = Grid.line_contact(dovetail.flank_size()[0] * 1.1, 37)
     return face, grid, FaceTransfer.between(face, grid)
 
 

@@ -72,9 +72,9 @@ def test_written_and_read_again(tmp_path, request, dimension):
     for one, other in zip(*(b.nodes[b.element_nodes] for b in (before, after)), strict=True):
         order = [np.lexsort(points.round(9).T) for points in (one, other)]
         np.testing.assert_allclose(one[order[0]], other[order[1]], atol=1e-12)
-    told = curvature(same_bodies(found).bodies[-1], found)
-    assert told is not None
-    assert told.edges == told.given == len(before.midsides)
+    reported = curvature(same_bodies(found).bodies[-1], found)
+    assert reported is not None
+    assert reported.edges == reported.given == len(before.midsides)
 
 
 def test_bodies_with_straight_edges_stay_as_they_are(found):
@@ -95,8 +95,8 @@ def test_edges_without_a_node_are_straight(found):
     assert 0 < given.sum() < len(edges)
     middle = body.points[edges].mean(axis=1)
     np.testing.assert_array_equal(body.midsides[~given], middle[~given])
-    told = curvature(body, part)
-    assert (told.given, told.edges) == (given.sum(), len(edges))
+    reported = curvature(body, part)
+    assert (reported.given, reported.edges) == (given.sum(), len(edges))
 
 
 def test_folded_elements_have_straight_edges(found):
@@ -110,12 +110,12 @@ def test_folded_elements_have_straight_edges(found):
     wrong = replace(found, midsides={"upper": replace(found.midsides["upper"], points=points)})
     body = with_midsides(same_bodies(found), wrong).bodies[1]
     assert not folded(body).any()
-    told = curvature(body, wrong)
-    assert told is not None
-    assert 1 <= told.straightened <= 8
+    reported = curvature(body, wrong)
+    assert reported is not None
+    assert 1 <= reported.straightened <= 8
     before = with_midsides(same_bodies(found), found).bodies[1]
     same = np.all(body.midsides == before.midsides, axis=1)
-    assert same.sum() >= len(same) - told.straightened
+    assert same.sum() >= len(same) - reported.straightened
     middle = straight.p[:, straight.edges].mean(axis=1).T
     np.testing.assert_array_equal(body.midsides[inside], middle[inside])
 

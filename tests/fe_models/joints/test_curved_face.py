@@ -76,7 +76,7 @@ def test_a_sphere_through_its_nodes_or_midsides(known: bool, left: float):
         for s in (surface, straight(points, facets))
     )
     assert error < left * before
-    assert (surface.left is None) is known
+    assert (surface.form_error is None) is known
 
 
 def test_beside_the_face_nothing_is_known():

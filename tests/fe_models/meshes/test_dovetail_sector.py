@@ -112,7 +112,7 @@ def test_sides_are_images(dovetail, dimension):
     disk = mesh.bodies[0]
     cuts = dovetail_cuts(dovetail, disk)
     assert cuts.matched
-    assert cuts.apart < 1e-9
+    assert cuts.max_distance < 1e-9
     assert len(cuts.low) + len(cuts.high) == len(disk.mesh.boundaries["sides"])
 
 

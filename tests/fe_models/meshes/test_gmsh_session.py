@@ -10,7 +10,7 @@ from fe_models.meshes.gmsh_session import RESET_BY_GMSH, gmsh_model
 NUMBERS = [getattr(signal, name) for name in RESET_BY_GMSH if hasattr(signal, name)]
 
 
-@pytest.fixture(params=[signal.SIG_IGN, lambda number, frame: heard.append(number)])
+@pytest.fixture(params=[signal.SIG_IGN, lambda number, frame: received.append(number)])
 def handler(request):
     """Return a signal handler: ignoring, as after `nohup`, or a program's own."""
     before = {number: signal.signal(number, request.param) for number in NUMBERS}
@@ -19,13 +19,13 @@ def handler(request):
         signal.signal(number, was)
 
 
-heard = []
+received = []
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_signals_stay_with_whoever_handled_them(handler):
-    heard.clear()
+    received.clear()
     with gmsh_model("nothing"):
         for number in NUMBERS:
             os.kill(os.getpid(), number)
-    assert heard == ([] if handler is signal.SIG_IGN else NUMBERS)
+    assert received == ([] if handler is signal.SIG_IGN else NUMBERS)

@@ -108,7 +108,7 @@ def test_triangles_and_quadrilaterals_in_the_plane(tmp_path, name, order):
     write = cae_files.abaqus if name == "plate.inp" else cae_files.universal
     (tmp_path / name).write_text(write(*mesh))
     imported = read_bodies(tmp_path / name)
-    assert not imported.left
+    assert not imported.unused
     ((_, body),) = imported.bodies.items()
     check_patch(body, 4.0)
 

@@ -43,9 +43,9 @@ def test_a_condensation_tells_its_steps(structure):
     one_sided = copy(structure.bodies[0])
     one_sided.mirror = lambda axis: None
     for joined in (structure, replace(structure, bodies=(one_sided, structure.bodies[1]))):
-        told = []
-        joined.condense(progress=lambda *counts, told=told: told.append(counts))
-        assert told == [(step, 5) for step in range(1, 5 + 1)]
+        reported = []
+        joined.condense(progress=lambda *counts, reported=reported: reported.append(counts))
+        assert reported == [(step, 5) for step in range(1, 5 + 1)]
 
 
 def test_split_resolvent_is_the_whole_one(both):
@@ -53,8 +53,8 @@ def test_split_resolvent_is_the_whole_one(both):
     vectors = np.random.default_rng(0).standard_normal((len(split.inverse), 3))
     expected = whole.inverse @ vectors
     one = split.inverse @ vectors[:, 0]
-    for found, told in ((split.inverse @ vectors, expected), (one, expected[:, 0])):
-        np.testing.assert_allclose(found, told, atol=1e-7 * np.abs(expected).max())
+    for found, reported in ((split.inverse @ vectors, expected), (one, expected[:, 0])):
+        np.testing.assert_allclose(found, reported, atol=1e-7 * np.abs(expected).max())
     np.testing.assert_allclose(one, (split.inverse @ vectors)[:, 0], rtol=1e-9, atol=1e-20)
 
 

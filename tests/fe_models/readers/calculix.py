@@ -71,8 +71,8 @@ class Job:
             terms = [dependent, *others[others != dependent]]
             for axis in (1, 2, 3):
                 self.model += ["*EQUATION", f"{len(terms)}"]
-                told = [f"{node + 1}, {axis}, {row[node]:.12e}" for node in terms]
-                self.model += [", ".join(told[k : k + 4]) for k in range(0, len(told), 4)]
+                reported = [f"{node + 1}, {axis}, {row[node]:.12e}" for node in terms]
+                self.model += [", ".join(reported[k : k + 4]) for k in range(0, len(reported), 4)]
 
     def load(self, number: int, forces: Array) -> None:
         """Add nodal forces ``(size,)`` on a body at the end of the last step."""

@@ -107,12 +107,12 @@ def test_nastran_deck(tmp_path):
     assert numbers_of(deck, "lower", "spc_1_z") == [14]
     assert numbers_of(deck, "lower", "spc_1_xy") == [14]
     assert numbers_of(deck, "upper", "force_4") == [26]
-    said = "\n".join(deck.left)
+    printed = "\n".join(deck.unused)
     lines = DECK.splitlines()
     for name in ("SPC1", "SPC ", "PLOAD4", "FORCE", "MAT1", "BSURFS"):
         line = next(k for k, row in enumerate(lines, 1) if row.startswith(name))
-        assert f"deck.bdf:{line}: {name.strip()}: " in said
-    assert "stiffness of CQUAD4, which names faces seat" in said
+        assert f"deck.bdf:{line}: {name.strip()}: " in printed
+    assert "stiffness of CQUAD4, which names faces seat" in printed
 
 
 def test_nastran_numbers_name_what_has_no_name(tmp_path):
@@ -238,7 +238,7 @@ def test_nastran_plane(tmp_path):
             text += f"{kind},{number},4,{','.join(map(str, cell))}\n"
     plate = read(tmp_path, "plate.bdf", text)
     assert volume(plate.bodies["4"]) == pytest.approx(4.0)
-    assert plate.left == ("plate.bdf:10: CQUAD4: bodies in the plane are in plane strain",)
+    assert plate.unused == ("plate.bdf:10: CQUAD4: bodies in the plane are in plane strain",)
 
 
 # --- universal files ------------------------------------------------------------------------------
@@ -284,7 +284,7 @@ def test_universal_file_of_salome(tmp_path):
         np.testing.assert_allclose(surface.normal, [0, 0, normal], atol=1e-12)
     assert numbers_of(mesh, "lower", "edge") == [1, 2]
     assert numbers_of(mesh, "upper", "corners") == [13, 15, 16]
-    assert mesh.left == ()
+    assert mesh.unused == ()
     assert str(mesh.unit) == "in m, as blocks.unv:2 says, converted to mm"
 
 
@@ -293,7 +293,7 @@ def test_universal_file_without_groups(tmp_path):
     mesh = read(tmp_path, "blocks.unv", salome(groups=False) + loads)
     assert list(mesh.bodies) == ["body_1", "body_2"]
     line = salome(groups=False).count("\n") + 2
-    assert mesh.left == (f"blocks.unv:{line}: dataset 790, loads",)
+    assert mesh.unused == (f"blocks.unv:{line}: dataset 790, loads",)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 
 from fe_models.geometry.imported import read_bodies
 from fe_models.meshes.structure_mesh import MeshError
-from fe_models.readers.reader_process import read_apart
+from fe_models.readers.reader_process import read_in_subprocess
 from tests.fe_models.readers.test_abaqus import ASSEMBLY, PARTS
 from tests.fe_models.readers.test_cae_files import DECK, salome
 from tests.fe_models.readers.test_mesh_corpus import MSH, variables, write_exodus
@@ -78,7 +78,7 @@ def test_whatever_a_reader_raises_is_one_line(tmp_path):
     """Check an exception that cannot be passed between processes."""
     path = tmp_path / "a.msh"
     with pytest.raises(MeshError, match=r"a\.msh: cannot be read \(OddError: 7\): it may") as error:
-        read_apart(raise_oddly, path)
+        read_in_subprocess(raise_oddly, path)
     assert "\n" not in str(error.value)
 
 

@@ -97,7 +97,7 @@ def test_powershell_writes_utf_16(tmp_path):
 def test_properties_of_one_body_are_told(tmp_path):
     path = tmp_path / "a.bdf"
     path.write_text(HALVES, encoding="utf-8")
-    assert "a.bdf: 4, 5 share nodes: one body 4+5, of one material" in read_bodies(path).left
+    assert "a.bdf: 4, 5 share nodes: one body 4+5, of one material" in read_bodies(path).unused
 
 
 def test_beams_on_edges_name_these_and_are_told(tmp_path):
@@ -106,12 +106,12 @@ def test_beams_on_edges_name_these_and_are_told(tmp_path):
     path.write_text(FLAT + TETRA + EDGES, encoding="utf-8")
     imported = read_bodies(path)
     assert imported.node_numbers["part"][imported.points["part"]["edge"]].tolist() == [1, 2]
-    assert imported.left == ("a.inp:9: stiffness of B31, which names edges",)
+    assert imported.unused == ("a.inp:9: stiffness of B31, which names edges",)
     trusses = EDGES.replace("B31", "T3D2")
     path.write_text(FLAT + TETRA + trusses, encoding="utf-8")
-    assert read_bodies(path).left == ()
+    assert read_bodies(path).unused == ()
     path.write_text(FLAT + TETRA + trusses + "*SOLID SECTION, ELSET=edge\n1.\n", encoding="utf-8")
-    assert read_bodies(path).left == ("a.inp:9: stiffness of T3D2, which names edges",)
+    assert read_bodies(path).unused == ("a.inp:9: stiffness of T3D2, which names edges",)
     path.write_text(FLAT + "5, 9., 9., 9.\n" + TETRA + EDGES.replace("1, 2", "1, 5"))
     with pytest.raises(MeshError, match="B31 with nodes on no solid is a beam: mesh its volume"):
         read_bodies(path)
@@ -225,7 +225,7 @@ def test_exodus(tmp_path, classic):
     np.testing.assert_allclose([*base.normal, base.area], [0, 0, -1, 6], atol=1e-12)
     tips = imported.node_numbers["upper"][imported.points["upper"]["node_set_1"]]
     assert tips.tolist() == [112, 115]
-    assert "one body" in imported.left[0]
+    assert "one body" in imported.unused[0]
 
 
 def test_shells_of_exodus_name_faces(tmp_path):
@@ -240,7 +240,7 @@ def test_shells_of_exodus_name_faces(tmp_path):
     upper = imported.bodies["block_40"]
     assert patch(upper, "block_5").area == pytest.approx(18.0, rel=1e-12)
     assert patch(upper, "base").area == pytest.approx(18.0 + 18.0 * 3**0.5, rel=1e-12)
-    assert imported.left[1] == "a.e: stiffness of TRI3, which names faces or edges block_5"
+    assert imported.unused[1] == "a.e: stiffness of TRI3, which names faces or edges block_5"
 
 
 @pytest.mark.parametrize(

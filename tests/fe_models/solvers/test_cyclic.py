@@ -321,8 +321,8 @@ def test_vertices_near_and_far_from_cuts(order):
         np.testing.assert_allclose(
             recovery.stress(moved, None, some), stress[:, some], atol=1e-12 * size
         )
-        told = recovery.histories(moved[:, None], some)[0]
-        np.testing.assert_allclose(told, stress[:, some], atol=1e-10 * size)
+        reported = recovery.histories(moved[:, None], some)[0]
+        np.testing.assert_allclose(reported, stress[:, some], atol=1e-10 * size)
         np.testing.assert_allclose(
             recovery.alternatives(moved, some), others[:, :, some], atol=1e-10 * size
         )
@@ -410,7 +410,7 @@ def test_stress_of_cuts_is_as_good_as_elsewhere(moved):
 
 
 @pytest.mark.parametrize(
-    ("cyclic", "changed", "said"),
+    ("cyclic", "changed", "printed"),
     [
         (about(sectors=5), {}, "the centres of both are 60° apart, as for 6 sectors"),
         (about(sectors=7), {"moved": 0.3}, "is not low turned about the axis by 360°/7"),
@@ -419,8 +419,8 @@ def test_stress_of_cuts_is_as_good_as_elsewhere(moved):
         (about(sectors=6, high=("low",)), {}, "share facets"),
     ],
 )
-def test_cuts_that_are_no_images(cyclic, changed, said):
-    with pytest.raises(MeshError, match=said):
+def test_cuts_that_are_no_images(cyclic, changed, printed):
+    with pytest.raises(MeshError, match=printed):
         Cuts.of(sector(6, **changed), cyclic)
 
 

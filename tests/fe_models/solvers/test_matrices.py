@@ -13,14 +13,14 @@ import scipy.sparse as sp
 
 from fe_models.joints.reduction import save_reduced
 from fe_models.matrices import (
+    ExternalMatrices,
     FileUnits,
     GivenUnknowns,
     MatrixError,
-    OwnMatrices,
     Unknown,
+    external_matrices,
     lowest_frequencies,
     on_all,
-    own_matrices,
     read_matrix_file,
     write_matrices,
 )
@@ -108,7 +108,7 @@ def own_of(stiffness, mass, unknowns=ROWS, **others):
     )
     empty = {"damping": None, "loads": np.zeros((size, 0))}
     matrices = sp.csr_matrix(stiffness), sp.csr_matrix(mass)
-    return OwnMatrices(*matrices, **(empty | others), unknowns=unknowns)
+    return ExternalMatrices(*matrices, **(empty | others), unknowns=unknowns)
 
 
 # --- formats ------------------------------------------------------------------------------------
@@ -157,10 +157,10 @@ def op4(path):
 )
 def test_files_of_arrays(tmp_path, write, name):
     write(tmp_path / name)
-    own = the_matrices(own_matrices({}, tmp_path / name, GivenUnknowns(ROWS)))
+    own = the_matrices(external_matrices({}, tmp_path / name, GivenUnknowns(ROWS)))
     np.testing.assert_array_equal(own.loads, LOAD)
     with pytest.raises(MatrixError, match="does not say what its 3 rows are; allowed: unknowns"):
-        own_matrices({}, tmp_path / name)
+        external_matrices({}, tmp_path / name)
 
 
 @pytest.mark.parametrize("layout", ["coordinate", "array"])
@@ -169,7 +169,7 @@ def test_matrix_market_and_sparse_npz(tmp_path, layout):
     scipy.io.mmwrite(tmp_path / "k.mtx", stiffness, symmetry="symmetric")
     sp.save_npz(tmp_path / "m.npz", sp.csr_matrix(MASS))
     sources = {"stiffness": (tmp_path / "k.mtx", ""), "mass": (tmp_path / "m.npz", "")}
-    the_matrices(own_matrices(sources, given=GivenUnknowns(ROWS)))
+    the_matrices(external_matrices(sources, given=GivenUnknowns(ROWS)))
 
 
 def write_texts(folder, **texts):
@@ -181,7 +181,7 @@ def write_texts(folder, **texts):
 
 def test_abaqus_matrix_input(tmp_path):
     sources = write_texts(tmp_path, stiffness=MATRIX_INPUT, mass=MASS_INPUT, loads="2,1, 1.0\n")
-    own = the_matrices(own_matrices(sources))
+    own = the_matrices(external_matrices(sources))
     np.testing.assert_array_equal(own.loads, LOAD)
 
 
@@ -190,11 +190,11 @@ def test_displacements_that_abaqus_holds_are_none(tmp_path):
     sources = write_texts(
         tmp_path, stiffness=MATRIX_INPUT + held, mass=f"{MASS_INPUT}3,2, 3,2, 1.0\n"
     )
-    own = the_matrices(own_matrices(sources))
+    own = the_matrices(external_matrices(sources))
     assert own.held == (Unknown("3", "y"),)
     sources = write_texts(tmp_path, stiffness=COORDINATE + "4 4 1e36\n", mass=COORDINATE)
     with pytest.raises(MatrixError, match="row 4 is held by 1e36"):
-        own_matrices(sources, given=GivenUnknowns(ROWS))
+        external_matrices(sources, given=GivenUnknowns(ROWS))
 
 
 def test_abaqus_coordinates_have_one_triangle_or_both(tmp_path):
@@ -204,18 +204,18 @@ def test_abaqus_coordinates_have_one_triangle_or_both(tmp_path):
     )
     for stiffness in (COORDINATE, lower):
         sources = write_texts(tmp_path, stiffness=stiffness, mass=mass, loads="2 1.0\n3 0.0\n")
-        own = the_matrices(own_matrices(sources, given=GivenUnknowns(ROWS)))
+        own = the_matrices(external_matrices(sources, given=GivenUnknowns(ROWS)))
         np.testing.assert_array_equal(own.loads, LOAD)
 
 
 def test_an_abaqus_substructure(tmp_path):
     (tmp_path / "z1.mtx").write_text(SUBSTRUCTURE, encoding="utf-8")
-    the_matrices(own_matrices({}, tmp_path / "z1.mtx"))
+    the_matrices(external_matrices({}, tmp_path / "z1.mtx"))
 
 
 def test_a_nastran_punch_file(tmp_path):
     (tmp_path / "se.pch").write_text(PUNCH, encoding="utf-8")
-    own = the_matrices(own_matrices({}, tmp_path / "se.pch"))
+    own = the_matrices(external_matrices({}, tmp_path / "se.pch"))
     np.testing.assert_array_equal(own.loads, LOAD)
     assert own.taken == {"stiffness": "KAAX", "mass": "MAAX", "loads": "PAX"}
 
@@ -234,7 +234,7 @@ def test_scalar_points_of_nastran_are_modes_and_come_with_nodes(tmp_path):
         "DMIG    MAAX           0", "DMIG,KAAX,101,0,,101,0,4.0E+6\nDMIG    MAAX           0", 1
     )
     (tmp_path / "se.pch").write_text(f"{text}DMIG,MAAX,101,,,101,,1.0\n", encoding="utf-8")
-    own = own_matrices({}, tmp_path / "se.pch")
+    own = external_matrices({}, tmp_path / "se.pch")
     assert own.unknowns[-1] == Unknown("101", "modal")
     assert on_all(own).frequencies == pytest.approx([2000.0 / (2.0 * np.pi)])
 
@@ -249,11 +249,11 @@ def test_without_pyyeti_op4_says_what_to_install(tmp_path, monkeypatch):
 def test_nodes_are_given_names(tmp_path):
     sources = write_texts(tmp_path, stiffness=MATRIX_INPUT, mass=MASS_INPUT)
     given = GivenUnknowns(nodes={"2": "tip 1"}, places={"tip 1": np.array([1.0, 2.0, 3.0])})
-    own = own_matrices(sources, given=given)
+    own = external_matrices(sources, given=given)
     assert own.unknowns[1:] == (Unknown("tip 1", "x"), Unknown("tip 1", "rz"))
     np.testing.assert_array_equal(own.places[1], [1.0, 2.0, 3.0])
     with pytest.raises(MatrixError, match="node 7: not in the matrices"):
-        own_matrices(sources, given=GivenUnknowns(nodes={"7": "tip"}))
+        external_matrices(sources, given=GivenUnknowns(nodes={"7": "tip"}))
 
 
 @pytest.mark.parametrize("ending", ["npz", "mat", "h5", "mtx"])
@@ -269,9 +269,9 @@ def test_a_reduced_model_comes_back(tmp_path, ending):
     if ending == "mtx":
         parts = "stiffness", "mass", "damping", "loads"
         sources = {part: (tmp_path / f"body_{part}.mtx", "") for part in parts}
-        back = on_all(own_matrices(sources, given=GivenUnknowns(unknowns)))
+        back = on_all(external_matrices(sources, given=GivenUnknowns(unknowns)))
     else:
-        back = on_all(own_matrices({}, tmp_path / f"body.{ending}"))
+        back = on_all(external_matrices({}, tmp_path / f"body.{ending}"))
         np.testing.assert_array_equal(back.places, model.places)
     for name in ("stiffness", "mass", "damping", "loads"):
         np.testing.assert_array_equal(getattr(back, name), getattr(model, name))
@@ -294,7 +294,7 @@ def test_damaged_texts_end_in_one_line(tmp_path, name, text):
     for _ in range(40):
         path.write_text(damaged(text, chance), encoding="utf-8")
         try:
-            own_matrices({}, path, GivenUnknowns(ROWS) if text == COORDINATE else None)
+            external_matrices({}, path, GivenUnknowns(ROWS) if text == COORDINATE else None)
         except MatrixError as error:
             refusals.append(str(error))
     assert all("\n" not in line and len(line) < 400 for line in refusals)
@@ -310,13 +310,13 @@ def test_damaged_arrays_end_in_one_line(tmp_path, write, name):
         at, gone = chance.randrange(len(whole)), chance.randrange(1, 40)
         path.write_bytes(whole[:at] + chance.randbytes(gone) + whole[at + gone :])
         try:
-            own_matrices({}, path, GivenUnknowns(ROWS))
+            external_matrices({}, path, GivenUnknowns(ROWS))
         except MatrixError as error:
             refusals.append(str(error))
     assert not any("\n" in line for line in refusals)
     path.write_bytes(whole[:40])
     with pytest.raises(MatrixError, match="cannot be read"):
-        own_matrices({}, path, GivenUnknowns(ROWS))
+        external_matrices({}, path, GivenUnknowns(ROWS))
 
 
 # --- checks -------------------------------------------------------------------------------------
@@ -349,14 +349,14 @@ def changed(matrix, row, column, value):
 def test_what_is_no_structure_is_refused(tmp_path, matrices, part, words):
     path = saved(tmp_path / "a.npz", **matrices)
     with pytest.raises(MatrixError) as refusal:
-        own_matrices({}, path, GivenUnknowns(ROWS))
+        external_matrices({}, path, GivenUnknowns(ROWS))
     assert words in str(refusal.value)
     assert refusal.value.part == part
 
 
 def test_rounding_is_no_asymmetry(tmp_path):
     path = saved(tmp_path / "a.npz", K=changed(STIFFNESS, 0, 1, -100.0 * (1.0 + 1e-9)))
-    own = own_matrices({}, path, GivenUnknowns(ROWS))
+    own = external_matrices({}, path, GivenUnknowns(ROWS))
     assert own.stiffness[0, 1] == own.stiffness[1, 0] == pytest.approx(-100.0 * (1.0 + 5e-10))
 
 
@@ -364,11 +364,11 @@ def test_missing_and_unknown_names_are_told(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, Kred=STIFFNESS, M=MASS, Q=MASS)
     with pytest.raises(MatrixError, match=r"which is the stiffness\? allowed: one of Kred, M, Q"):
-        own_matrices({}, path, GivenUnknowns(ROWS))
+        external_matrices({}, path, GivenUnknowns(ROWS))
     with pytest.raises(MatrixError, match="Kfull: no such matrix; allowed: one of Kred, M, Q"):
-        own_matrices({"stiffness": (path, "Kfull")}, path, GivenUnknowns(ROWS))
-    own = own_matrices({"stiffness": (path, "Kred")}, path, GivenUnknowns(ROWS))
-    assert the_matrices(own).left == ("Q",)
+        external_matrices({"stiffness": (path, "Kfull")}, path, GivenUnknowns(ROWS))
+    own = external_matrices({"stiffness": (path, "Kred")}, path, GivenUnknowns(ROWS))
+    assert the_matrices(own).unused == ("Q",)
 
 
 # --- units --------------------------------------------------------------------------------------
@@ -406,7 +406,7 @@ def test_a_beam_in_metres_is_the_same_beam(tmp_path):
     np.savez(path, **dict(zip("KMCF", (*bordered, F), strict=True)))
     names = ("1", "y"), ("1", "rz"), ("2", "y"), ("2", "rz"), ("mode 1", "modal")
     given = GivenUnknowns(tuple(Unknown(*name) for name in names))
-    own = own_matrices({}, path, given, FileUnits(length=1000.0))
+    own = external_matrices({}, path, given, FileUnits(length=1000.0))
     for matrix, expected in zip((own.stiffness, own.mass), in_mm, strict=True):
         np.testing.assert_allclose(matrix.toarray()[:4, :4], expected, rtol=1e-12)
     np.testing.assert_allclose(own.damping.toarray()[:4, :4], 2e-5 * in_mm[0], rtol=1e-12)

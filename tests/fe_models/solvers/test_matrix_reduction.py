@@ -9,8 +9,8 @@ import scipy.sparse as sp
 
 from fe_models.joints.reduction import free_frequencies
 from fe_models.matrices import (
+    ExternalMatrices,
     MatrixError,
-    OwnMatrices,
     Unknown,
     check_definite,
     lowest_frequencies,
@@ -57,7 +57,7 @@ def plate():
     )
     loads = np.zeros((len(unknowns), 1))
     loads[len(unknowns) // 2] = 1.0
-    return OwnMatrices(K, M, 1e-6 * K + 40.0 * M, loads, unknowns)
+    return ExternalMatrices(K, M, 1e-6 * K + 40.0 * M, loads, unknowns)
 
 
 def edge(name):
@@ -80,8 +80,8 @@ def test_large_matrices_are_reduced(plate):
     np.testing.assert_allclose(model.damping, expected, atol=1e-9 * np.abs(expected).max())
     assert plate.moved_mass()["x"] == pytest.approx(400.0 * 7.85e-9, rel=1e-12)
     assert check_definite(model) == 3
-    told = lowest_frequencies(plate, 4)
-    np.testing.assert_allclose(told, [0.0, 0.0, 0.0, *full[:4]], rtol=1e-9)
+    reported = lowest_frequencies(plate, 4)
+    np.testing.assert_allclose(reported, [0.0, 0.0, 0.0, *full[:4]], rtol=1e-9)
 
 
 def test_a_load_inside_moves_what_is_retained(plate):

@@ -149,9 +149,9 @@ def test_bolts_are_shortened_until_they_have_their_force():
     path = np.linspace(0.25, 1.0, 4)[:, None]
     (shortening,) = tightened(structure, joint, path, [Bolt("rods", 0, section, 700.0)])
     states = marched(structure, shortening * path)
-    told = tensions(structure, section, states, shortening * path)
-    assert told[-1] == pytest.approx(700.0, rel=2e-6)
-    np.testing.assert_allclose(told, 700.0 * path[:, 0], rtol=1e-2)
+    reported = tensions(structure, section, states, shortening * path)
+    assert reported[-1] == pytest.approx(700.0, rel=2e-6)
+    np.testing.assert_allclose(reported, 700.0 * path[:, 0], rtol=1e-2)
 
 
 def test_a_load_on_the_clamped_parts_divides_as_stiffness_says():
@@ -163,14 +163,14 @@ def test_a_load_on_the_clamped_parts_divides_as_stiffness_says():
     structure, section = clamped(opening)
     path = np.array([[0.01, 0.0], [0.01, 10.0], [0.01, 20.0], [0.01, 1e4]])
     states = marched(structure, path)
-    told = tensions(structure, section, states, path)
+    reported = tensions(structure, section, states, path)
     pressed = np.array([structure.interface_resultants(s)[1, 0] for s in states])
     # The pressure acts on 2 mm²; the rods carry the block's remaining force and the pressure.
-    np.testing.assert_allclose(told, pressed + 2.0 * path[:, 1], rtol=1e-9)
-    shares = np.diff(told[:3]) / 20.0
+    np.testing.assert_allclose(reported, pressed + 2.0 * path[:, 1], rtol=1e-9)
+    shares = np.diff(reported[:3]) / 20.0
     assert shares[0] == pytest.approx(shares[1], rel=2e-3)
     assert 0.0 < shares[0] < 1.0
-    assert told[3] == pytest.approx(2e4, rel=1e-6)
+    assert reported[3] == pytest.approx(2e4, rel=1e-6)
 
 
 def test_cuts_that_cannot_be_are_refused():

@@ -125,8 +125,8 @@ def test_contacts_of_a_sector_are_those_of_the_wheel(dimension, order, supports,
         place = apart.argmin(axis=0)
         stress = np.abs(own.stress).max()
         np.testing.assert_allclose(own.stress, whole.stress[:, place], atol=1e-7 * stress)
-        told, of_ring = (surface.stress for surface in surfaces)
-        np.testing.assert_allclose(told, of_ring[:, :, place], atol=1e-7 * stress)
+        reported, of_ring = (surface.stress for surface in surfaces)
+        np.testing.assert_allclose(reported, of_ring[:, :, place], atol=1e-7 * stress)
         for name in ("peak", "notch"):
             a, b = getattr(own, name), getattr(whole, name)
             assert a.von_mises == pytest.approx(b.von_mises, rel=1e-7)
@@ -189,14 +189,14 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("changes", "said"), REFUSED)
-def test_wrong_cuts_are_refused(changes, said):
-    with pytest.raises(MeshError, match=said):
+@pytest.mark.parametrize(("changes", "printed"), REFUSED)
+def test_wrong_cuts_are_refused(changes, printed):
+    with pytest.raises(MeshError, match=printed):
         sector_of(**changes)
 
 
 @pytest.mark.parametrize(
-    ("load", "said"),
+    ("load", "printed"),
     [
         (Rotation(Y, np.array([1.0, 0.0, 0.0]), 500.0), "a rotation about another axis"),
         (Acceleration(np.array([0.0, 0.0, 9810.0])), "an acceleration across the axis"),
@@ -204,9 +204,9 @@ def test_wrong_cuts_are_refused(changes, said):
         (Displacement("rim", np.array([0.01, 0.0, 0.0])), "rim meets a cut of structure.cyclic"),
     ],
 )
-def test_loads_that_are_not_alike_in_all_sectors(load, said):
+def test_loads_that_are_not_alike_in_all_sectors(load, printed):
     body = turned(shoe(SECTORS, COUNTS), CYCLIC, 0)
-    with pytest.raises(MeshError, match=said):
+    with pytest.raises(MeshError, match=printed):
         structure_of(sector(SECTORS, COUNTS), [body], [load], [CYCLIC], 1)
     structure_of(wheel(sector(SECTORS, COUNTS), CYCLIC), [body], [load][:0], (), 1)
 

@@ -8,16 +8,16 @@ import pytest
 import scipy.sparse as sp
 
 from fe_models.matrices import (
+    ExternalMatrices,
     FileUnits,
     GivenUnknowns,
     MatrixError,
-    OwnMatrices,
     Unknown,
     check_definite,
+    external_matrices,
     lowest_frequencies,
     on_all,
     on_retained,
-    own_matrices,
     read_matrix_file,
     with_light_motions,
     without_massless,
@@ -35,7 +35,7 @@ FORMATS = ("csr", "csc", "coo", "lil", "dia", "dok")
 
 
 def row(stiffness=STIFFNESS, mass=MASS, damping=None, loads=LOADS, **more):
-    return OwnMatrices(stiffness, mass, damping, loads, NAMES, **more)
+    return ExternalMatrices(stiffness, mass, damping, loads, NAMES, **more)
 
 
 MODEL = on_all(row())
@@ -107,14 +107,14 @@ def test_what_is_no_number_is_refused(value):
     [
         lambda: FileUnits(length=0.0),
         lambda: FileUnits(force=-1.0),
-        lambda: OwnMatrices(STIFFNESS, MASS, None, LOADS, NAMES[:1] * COUNT),
+        lambda: ExternalMatrices(STIFFNESS, MASS, None, LOADS, NAMES[:1] * COUNT),
         lambda: on_retained(row(), ["0", "6"], 1),
         lambda: on_retained(row(), "05", 1),
         lambda: on_retained(row(), ["0"], -1),
         lambda: lowest_frequencies(row(), 0),
         lambda: with_light_motions(MODEL, 0.0),
-        lambda: own_matrices({"stifness": (Path("k.mtx"), "")}),
-        lambda: own_matrices({}),
+        lambda: external_matrices({"stifness": (Path("k.mtx"), "")}),
+        lambda: external_matrices({}),
         lambda: GivenUnknowns(rows=NAMES, places=PLACES[1:]),
         lambda: GivenUnknowns(rows=NAMES, places=PLACES.T),
         lambda: read_matrix_file("matrices.doc"),
@@ -141,5 +141,5 @@ def test_a_model_without_names_or_mass_is_refused():
 def test_folders_may_be_texts(tmp_path):
     write_matrices(MODEL, str(tmp_path), "row", ("npz",))
     assert "stiffness" in read_matrix_file(str(tmp_path / "row.npz")).matrices
-    back = own_matrices({}, str(tmp_path / "row.npz"))
+    back = external_matrices({}, str(tmp_path / "row.npz"))
     np.testing.assert_allclose(back.stiffness.toarray(), STIFFNESS)

@@ -32,7 +32,7 @@ def sphere(beta):
 
 def cylinder(beta):
     bodies = pair(beta)
-    grid = Grid.strips(3 * np.sqrt(4 * P * RADIUS / (np.pi * bodies.contact_modulus)), 96)
+    grid = Grid.line_contact(3 * np.sqrt(4 * P * RADIUS / (np.pi * bodies.contact_modulus)), 96)
     return HalfSpace(grid, bodies), grid.x**2 / (2 * RADIUS)
 
 

@@ -41,7 +41,7 @@ STEP = 1.0
 
 def strip(cells=256, margin=0.25):
     """Return a flat of half width 1 mm, a whole number of cells, with a step at its ends."""
-    grid = Grid.strips(2.0 * (HALF + margin), cells)
+    grid = Grid.line_contact(2.0 * (HALF + margin), cells)
     return grid, np.where(np.abs(grid.x) < HALF, 0.0, STEP)
 
 
@@ -114,7 +114,7 @@ def test_a_load_acts_within_the_cell_centres_or_is_refused(pair, side, axis):
     def state(share):
         values = np.array([P, 0.0, 0.0, 0.0, 0.0, 0.0])
         values[[4, 3][axis]] = side * P * reach * share
-        return contact.advance(contact.apart(height), height, ContactLoad(values))
+        return contact.advance(contact.unloaded_state(height), height, ContactLoad(values))
 
     inside = state(0.999)
     assert inside.converged, inside.message
@@ -133,7 +133,7 @@ def test_a_contact_reaches_the_border_of_its_grid_or_not(pair):
         height = sphere.gap(grid.x, grid.y)
         contact = FrictionalContact(HalfSpace(grid, pair), 0.1)
         state = contact.advance(
-            contact.apart(height), height, ContactLoad(np.array([P, 0, 0, 0, 0, 0.0]))
+            contact.unloaded_state(height), height, ContactLoad(np.array([P, 0, 0, 0, 0, 0.0]))
         )
         assert state.converged
         assert (state.border_load > 0.0) == cut
@@ -180,4 +180,4 @@ def test_a_run_warns_of_a_contact_that_is_cut_off(tmp_path, share, cut):
     done = CliRunner().invoke(cli, [*arguments, "--set", f"contact.size=[{size}, {size}]"])
     assert done.exit_code == 0, done.stderr
     warnings = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["warnings"]
-    assert any("touches the border" in told for told in warnings) == cut
+    assert any("touches the border" in reported for reported in warnings) == cut

@@ -41,15 +41,15 @@ def ball(grid):
         Grid((1, 21), (0.1, 0.1)),
         Grid((2, 2), (0.5, 0.5)),
         Grid((5, 3), (0.3, 0.5)),
-        Grid.strips(2.0, 61),
-        Grid.strips(2.0, 3),
+        Grid.line_contact(2.0, 61),
+        Grid.line_contact(2.0, 3),
     ],
     ids=lambda grid: f"{grid.shape[0]}x{grid.shape[1]}{'line' * grid.line}",
 )
 def test_any_grid_is_solved(kind, grid):
     """Cells of 1:20, odd counts, single rows and few cells meet every condition."""
     contact, height = FrictionalContact(HalfSpace(grid, PAIRS[kind]), 0.5), ball(grid)
-    state = contact.apart(height)
+    state = contact.unloaded_state(height)
     for load in (force(P), force(P, 60.0), force(P, -60.0, 60.0), force(0.5 * P, 20.0)):
         before, state = state, contact.advance(state, height, load)
         assert state.converged, state.message
@@ -85,7 +85,7 @@ def test_heights_far_from_zero_are_those_near_it(kind, offset, load):
     contact = FrictionalContact(HalfSpace(grid, PAIRS[kind]), 0.5)
     states = []
     for height in (near, far):
-        pressed = contact.advance(contact.apart(height), height, force(load))
+        pressed = contact.advance(contact.unloaded_state(height), height, force(load))
         sheared = contact.advance(pressed, height, force(load, 0.2 * load))
         assert sheared.converged, sheared.message
         states.append(sheared)
@@ -111,7 +111,7 @@ def test_a_slope_of_the_heights_is_a_tilt(slope):
 
 def test_a_gap_that_vanishes_to_rounding_is_no_crash():
     """A peak of 1 m on one of two strips once ended the search in a division by zero."""
-    grid = Grid.strips(1.0, 2)
+    grid = Grid.line_contact(1.0, 2)
     contact = NormalContact(HalfSpace(grid, PAIRS["alike"]))
     state = contact.solve(np.array([[1e3], [0.0]]), 1e-3, My=0.0)
     if state.converged:
@@ -129,8 +129,8 @@ def test_numbers_that_are_none_are_refused(kind, bad):
     hole = height.copy()
     hole[3, 4] = -bad  # +infinity is a cell without a surface
     with pytest.raises(refused, match="NaN or -infinity"):
-        contact.advance(contact.apart(hole), hole, force(P))
-    pressed = contact.advance(contact.apart(height), height, force(P))
+        contact.advance(contact.unloaded_state(hole), hole, force(P))
+    pressed = contact.advance(contact.unloaded_state(height), height, force(P))
     for place in range(6):
         values = force(P).values
         values[place] = bad

@@ -51,7 +51,7 @@ FULL = 0.25 * np.pi * MODULUS * HALF**2 / RADIUS
 
 
 def strip(cells=400):
-    grid = Grid.strips(2.0 * HALF, cells)
+    grid = Grid.line_contact(2.0 * HALF, cells)
     return grid, NormalContact(HalfSpace(grid, PAIR)), grid.x**2 / (2.0 * RADIUS)
 
 
@@ -107,12 +107,15 @@ def test_nearly_conforming_bodies_tend_to_flat_ones(kind, radius):
     contact = FrictionalContact(HalfSpace(grid, pair), 0.3)
     height = (grid.x**2 + grid.y**2) / (2.0 * radius)
     flat, round_ = (
-        contact.advance(contact.apart(gap), gap, force(100.0))
+        contact.advance(contact.unloaded_state(gap), gap, force(100.0))
         for gap in (np.zeros(grid.shape), height)
     )
     assert flat.converged
     assert round_.converged
-    assert frictional_error(contact, contact.apart(height), height, round_, force(100.0)) < 3e-8
+    assert (
+        frictional_error(contact, contact.unloaded_state(height), height, round_, force(100.0))
+        < 3e-8
+    )
     assert (round_.pressure > 0.0).all() == (radius > 1e3)
     if radius > 1e3:
         assert round_.border_load > 0.0
@@ -140,7 +143,7 @@ def test_a_load_on_one_cell_then_on_five(kind):
     """Just above, pressures p0 and four times p1 follow from a system of two equations."""
     grid, height, pair, limit, (itself, next_to, diagonal, across) = ball(kind)
     contact = FrictionalContact(HalfSpace(grid, pair), 0.3)
-    start = contact.apart(height)
+    start = contact.unloaded_state(height)
     one = contact.advance(start, height, force(0.99 * limit))
     assert one.converged, one.message
     assert np.count_nonzero(one.pressure) == 1
@@ -165,7 +168,7 @@ def test_one_cell_carries_shear_up_to_friction_and_no_moment(kind):
     grid, height, pair, limit, _ = ball(kind)
     P = 0.5 * limit
     contact = FrictionalContact(HalfSpace(grid, pair), 0.3)
-    pressed = contact.advance(contact.apart(height), height, force(P))
+    pressed = contact.advance(contact.unloaded_state(height), height, force(P))
     state = contact.advance(pressed, height, force(P, Qx=0.999 * 0.3 * P))
     assert state.converged, state.message
     assert np.count_nonzero(state.sticking) == 1
@@ -191,7 +194,7 @@ def test_loads_of_any_size(kind, P):
     """Tiny loads rest on a cell, huge ones press the whole grid, which is reported."""
     grid, height, pair, limit, _ = ball(kind)
     contact = FrictionalContact(HalfSpace(grid, pair), 0.3)
-    start = contact.apart(height)
+    start = contact.unloaded_state(height)
     state = contact.advance(start, height, force(P))
     assert state.converged, state.message
     assert frictional_error(contact, start, height, state, force(P)) < 3.0 * SOLVED
@@ -251,7 +254,7 @@ def test_any_roughness_of_unlike_bodies_is_solved(rms, seed):
     """Three cells carry a load within the triangle of their centres; then sheared, and back."""
     grid, height = rough(24, rms, seed)
     contact = FrictionalContact(HalfSpace(grid, PAIRS["unlike"]), 0.5)
-    state = contact.apart(height)
+    state = contact.unloaded_state(height)
     for Qx in (0.0, 10.0, -10.0):
         before, state = state, contact.advance(state, height, force(100.0, Qx))
         assert state.converged, state.message

@@ -23,7 +23,7 @@ def sphere(pair, cells=48, friction=FRICTION):
     contact = FrictionalContact(HalfSpace(grid, pair), friction, SOLVED)
     height = hertz.gap(grid.x, grid.y)
     loads = [ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0])) for Q in (0.0, 0.5 * friction * P)]
-    states = [contact.apart(height)]
+    states = [contact.unloaded_state(height)]
     for load in loads:
         states.append(contact.advance(states[-1], height, load))
         assert states[-1].converged, states[-1].message
@@ -86,7 +86,7 @@ def test_a_thousand_times_stiffer_is_almost_rigid(stiffer):
         grid = Grid.covering((size, size), (24, 24))
         contact = FrictionalContact(HalfSpace(grid, pair), FRICTION, 1e-10)
         height = hertz.gap(grid.x, grid.y)
-        state = contact.apart(height)
+        state = contact.unloaded_state(height)
         for Q in (0.0, 0.5 * FRICTION * P):
             before, load = state, ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0]))
             state = contact.advance(before, height, load)
@@ -110,7 +110,7 @@ def test_bodies_that_are_almost_alike_are_solved_as_if_they_were():
         grid = Grid.covering((1.2, 1.2), (24, 24))
         height = (grid.x**2 + grid.y**2) / (2.0 * RADIUS)
         contact = FrictionalContact(HalfSpace(grid, pair), FRICTION, 1e-10)
-        state = contact.apart(height)
+        state = contact.unloaded_state(height)
         for Q in (0.0, 20.0, -10.0):
             state = contact.advance(
                 state, height, ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0]))

@@ -20,7 +20,7 @@ from wear.steps.full_cycle import march_cycle
 
 def follow(contact, height, *loads):
     """Return the last of the states under consecutive (P, Qx)."""
-    state = contact.apart(height)
+    state = contact.unloaded_state(height)
     for load in loads:
         values = np.array([load[0], load[1], 0.0, 0.0, 0.0, 0.0])
         state = contact.advance(state, height, ContactLoad(values))
@@ -82,7 +82,7 @@ def test_a_bulk_strain_while_apart_is_not_felt(kind):
     """Stretching the surfaces while they are apart causes no shear when they touch again."""
     contact, height = sphere(kind)
     fresh = follow(contact, height, (P, 0.0))
-    state = contact.apart(height)
+    state = contact.unloaded_state(height)
     for load, strain in ((P, 0.0), (0.0, 1e-3), (P, 1e-3)):
         values = np.array([load, 0.0, 0.0, 0.0, 0.0, 0.0])
         state = contact.advance(state, height, ContactLoad(values, strain=strain))
@@ -95,7 +95,7 @@ def test_motions_that_part_the_bodies_and_join_them(kind):
     """The same holds for an approach that is reversed and imposed again."""
     contact, height = sphere(kind)
     depth = follow(contact, height, (P, 0.0)).rigid[0]
-    state, states = contact.apart(height), []
+    state, states = contact.unloaded_state(height), []
     for dz in (depth, -depth, 0.5 * depth, depth):
         values = np.array([dz, 0.0, 0.0, 0.0, 0.0, 0.0])
         load = ContactLoad(values, (True, False, False, True, True, False))
@@ -169,7 +169,7 @@ def test_a_flat_that_sticks_dissipates_nothing_and_one_that_slides_does():
     Complete contact of similar bodies, plane strain (Johnson 1985, section 7.2): below, no slip and
     no energy except for the solver's tolerance; above, exactly the given energy.
     """
-    grid = Grid.strips(2.0, 64)
+    grid = Grid.line_contact(2.0, 64)
     height = np.where(np.abs(grid.x) < 0.75, 0.0, 1.0)
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(ALIKE, ALIKE)), FRICTION, SOLVED)
     held = march_cycle(contact, height, cycle([P, P, P], [0.0, 0.95 * FRICTION * P, -10.0]))

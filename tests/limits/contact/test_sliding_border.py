@@ -24,14 +24,14 @@ def cylinder(kind, cells=128):
     """Return a line contact that takes two thirds of its grid under P, and its gap."""
     pair = PAIRS[kind]
     half = np.sqrt(4.0 * P * RADIUS / (np.pi * pair.contact_modulus))
-    grid = Grid.strips(3.0 * half, cells)
+    grid = Grid.line_contact(3.0 * half, cells)
     return FrictionalContact(HalfSpace(grid, pair), FRICTION, SOLVED), grid.x**2 / (2.0 * RADIUS)
 
 
 def pressed_on(scene, kind, *cells):
     """Return the contact of a scene, its gap, and the state under P."""
     contact, height = scene(kind, *cells)
-    return contact, height, contact.advance(contact.apart(height), height, load())
+    return contact, height, contact.advance(contact.unloaded_state(height), height, load())
 
 
 def load(Qx=0.0, Mz=0.0, energy=None):
@@ -90,7 +90,9 @@ def test_at_the_limit_rounding_does_not_choose_a_motion(off):
     steel = Material(200e3, 0.3)
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(steel, steel)), 0.3)
     height = (grid.x**2 + grid.y**2) / 40.0
-    pressed = contact.advance(contact.apart(height), height, ContactLoad(10.0 * np.eye(6)[0]))
+    pressed = contact.advance(
+        contact.unloaded_state(height), height, ContactLoad(10.0 * np.eye(6)[0])
+    )
     values = np.array([10.0, 3.0 * (1.0 + off), 0.0, 0.0, 0.0, 0.0])
     with pytest.raises(FrictionLimitError, match="without sliding") as info:
         contact.advance(pressed, height, ContactLoad(values))
@@ -135,7 +137,7 @@ def test_without_friction_no_shear_force_at_all(kind):
     grid = Grid.covering((0.6, 0.6), (12, 12))
     height = (grid.x**2 + grid.y**2) / (2.0 * RADIUS)
     contact = FrictionalContact(HalfSpace(grid, pair), 0.0)
-    pressed = contact.advance(contact.apart(height), height, load())
+    pressed = contact.advance(contact.unloaded_state(height), height, load())
     assert contact.advance(pressed, height, load()).converged
     with pytest.raises(FrictionLimitError, match=r"friction coefficient is 0|µP = 0 N"):
         contact.advance(pressed, height, load(Qx=1e-3))

@@ -22,16 +22,16 @@ GRIDS = {
     "row": Grid((1, 8), (0.3, 0.5)),
     "column": Grid((7, 1), (0.3, 0.5)),
     "cell": Grid((1, 1), (0.3, 0.5)),
-    "line, even": Grid.strips(2.0, 8),
-    "line, odd": Grid.strips(2.0, 9),
+    "line, even": Grid.line_contact(2.0, 8),
+    "line, odd": Grid.line_contact(2.0, 9),
 }
 LARGER_GRIDS = {
     "square": Grid((64, 64), (1.0, 1.0)),
     "long along y": Grid((16, 128), (1.0, 0.05)),
     "long along x": Grid((128, 16), (1.0, 0.05)),
     "flat cells": Grid((16, 16), (1.0, 0.02)),
-    "line": Grid.strips(4.0, 101),
-    "fine line": Grid.strips(4.0, 1000),
+    "line": Grid.line_contact(4.0, 101),
+    "fine line": Grid.line_contact(4.0, 1000),
 }
 EVERY_GRID = GRIDS | LARGER_GRIDS
 COMPONENT_SETS = [NORMAL, SHEAR, ALL]
@@ -127,7 +127,7 @@ def test_parts_are_those_of_the_full_vector(grid, pair):
         np.testing.assert_allclose(part, whole, rtol=0, atol=ROUNDING * scale)
 
 
-@pytest.mark.parametrize("grid", [Grid((16, 13), (0.3, 0.5)), Grid.strips(2.0, 16)])
+@pytest.mark.parametrize("grid", [Grid((16, 13), (0.3, 0.5)), Grid.line_contact(2.0, 16)])
 @pytest.mark.parametrize(("cells", "larger"), [((9, 7), 1.0), ((8, 6), 2.0), ((5, 4), 3.1)])
 def test_coefficients_from_a_finer_grid_are_those_of_the_grid(grid, cells, larger):
     """Boxes of the grid share coefficients, and larger cells of the same proportions.
@@ -135,7 +135,7 @@ def test_coefficients_from_a_finer_grid_are_those_of_the_grid(grid, cells, large
     Lines do not.
     """
     if grid.line:
-        other = Grid.strips(larger * grid.pitch[0] * cells[0], cells[0])
+        other = Grid.line_contact(larger * grid.pitch[0] * cells[0], cells[0])
     else:
         other = Grid(cells, (larger * grid.pitch[0], larger * grid.pitch[1]))
     taken = HalfSpace(grid, DISSIMILAR).on(other)
@@ -273,7 +273,7 @@ def test_line_load_of_hertzian_shape(cells, accuracy):
 
     At the centre it is -∫ ln|s/L| p ds, and the tangential displacement has a jump in slope.
     """
-    grid, datum = Grid.strips(2.2, cells), 5.0
+    grid, datum = Grid.line_contact(2.2, cells), 5.0
     x, pair = grid.x, DISSIMILAR
     profile = np.sqrt(np.maximum(0.0, 1.0 - x**2))
     inside = np.abs(x) < 1.0
@@ -302,7 +302,7 @@ def test_the_default_datum_is_two_widths_away():
 @pytest.mark.parametrize("datum", [1.99, 0.0, -4.0, np.nan])
 def test_a_datum_shorter_than_the_grid_is_refused(datum):
     with pytest.raises(ValueError, match=r"width of the grid, 2 mm|datum = nan"):
-        HalfSpace(Grid.strips(2.0, 8), DISSIMILAR, datum=datum)
+        HalfSpace(Grid.line_contact(2.0, 8), DISSIMILAR, datum=datum)
 
 
 @every_grid

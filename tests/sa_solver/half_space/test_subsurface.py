@@ -143,7 +143,7 @@ def sheared(pressure, friction=FRICTION):
 
 def cylinder_error(count, depths):
     """Return the largest error of a section over p0, at each depth."""
-    grid = Grid.strips(4.0 * CYLINDER.half_width, count)
+    grid = Grid.line_contact(4.0 * CYLINDER.half_width, count)
     traction = sheared(cell_means(grid))
     stress = SubsurfaceStress(grid, STEEL, 2).section(traction, "x", 0.0, depths)
     expected = cylinder_stress(CYLINDER, FRICTION, grid.x, depths, STEEL.poisson)
@@ -180,7 +180,7 @@ def test_the_trailing_edge_is_in_tension(body, side, sense):
     a, p0 = CYLINDER.half_width, CYLINDER.peak_pressure
     values = []
     for count in (256, 1024):
-        grid = Grid.strips(4.0 * a, count)
+        grid = Grid.line_contact(4.0 * a, count)
         stress = SubsurfaceStress(grid, STEEL, body).at_depth(
             sheared(cell_means(grid), sense * 0.4), 0.0
         )
@@ -326,7 +326,7 @@ def divergence(body, count):
 
 def test_a_plane_below_carries_the_load():
     """The force of a line load between ±R at a depth z follows from Flamant's stress."""
-    grid, depth = Grid.strips(20.0, 2001), 0.5
+    grid, depth = Grid.line_contact(20.0, 2001), 0.5
     traction = np.zeros((3, 2001, 1))
     traction[:, 1000] = np.array([20.0, 0.0, 50.0])[:, None]
     stress = SubsurfaceStress(grid, STEEL, 2).at_depth(traction, depth)
@@ -359,7 +359,7 @@ def test_exchange_of_the_axes():
 
 
 @pytest.mark.parametrize("body", [1, 2])
-@pytest.mark.parametrize("grid", [Grid((12, 17), (0.2, 0.15)), Grid.strips(2.0, 12)], ids=str)
+@pytest.mark.parametrize("grid", [Grid((12, 17), (0.2, 0.15)), Grid.line_contact(2.0, 12)], ids=str)
 def test_points_are_where_planes_and_sections_are(grid, body):
     """The points are below the centres of cells, in the middle of the loaded part of the grid."""
     traction = random_traction(grid)
@@ -435,7 +435,7 @@ def test_no_load_no_stress():
 
 
 def test_what_does_not_fit_is_refused():
-    line, plane = Grid.strips(1.0, 8), Grid((4, 5), (0.1, 0.1))
+    line, plane = Grid.line_contact(1.0, 8), Grid((4, 5), (0.1, 0.1))
     with pytest.raises(SubsurfaceError, match="body is 3"):
         SubsurfaceStress(line, STEEL, 3)
     with pytest.raises(SubsurfaceError, match="section along y"):

@@ -6,7 +6,7 @@ from functools import partial
 
 import pytest
 
-from sa_solver.transforms.threads import THREADS, at_once, begun, threads
+from sa_solver.transforms.threads import THREADS, begun, run_parallel, threads
 
 
 def _after(seconds: float, value: int) -> int:
@@ -21,7 +21,7 @@ def _fail() -> int:
 def test_answers_are_in_the_order_of_the_jobs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(THREADS, "2")
     jobs = [partial(_after, 0.02 * (3 - n), n) for n in range(4)]
-    assert at_once(jobs) == [0, 1, 2, 3]
+    assert run_parallel(jobs) == [0, 1, 2, 3]
 
 
 def test_jobs_work_side_by_side_only_where_threads_may(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -29,10 +29,10 @@ def test_jobs_work_side_by_side_only_where_threads_may(monkeypatch: pytest.Monke
     assert threads() == 2
     # Each job waits for the other.
     barrier = threading.Barrier(2, timeout=120.0)
-    assert sorted(at_once([barrier.wait, barrier.wait])) == [0, 1]
+    assert sorted(run_parallel([barrier.wait, barrier.wait])) == [0, 1]
     monkeypatch.setenv(THREADS, "1")
     here = threading.get_ident()
-    assert at_once([threading.get_ident, threading.get_ident]) == [here, here]
+    assert run_parallel([threading.get_ident, threading.get_ident]) == [here, here]
 
 
 @pytest.mark.parametrize("allowed", ["1", "2"])
@@ -41,7 +41,7 @@ def test_what_a_job_raises_is_raised_and_later_jobs_do_not_begin(monkeypatch, al
     begun: list[int] = []
     jobs = [_fail, *(partial(_after, 0.05, n) for n in range(2)), partial(begun.append, 1)]
     with pytest.raises(ZeroDivisionError):
-        at_once(jobs)
+        run_parallel(jobs)
     assert begun == []
 
 

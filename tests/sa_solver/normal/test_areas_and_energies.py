@@ -41,7 +41,7 @@ def test_those_of_hertz_and_of_cattaneo():
     stick = area * (1.0 - Q / (FRICTION * P)) ** (2.0 / 3.0)
     assert sheared.stick_area == pytest.approx(stick, rel=0.03)
     contact = FrictionalContact(half_space, FRICTION)
-    both = contact.advance(contact.apart(height), height, ContactLoad(P=P, Qx=Q))
+    both = contact.advance(contact.unloaded_state(height), height, ContactLoad(P=P, Qx=Q))
     coupled = CoupledContact(half_space, FRICTION).solve(height, None, [P, Q, 0, 0, 0, 0])
     for state in (both, coupled):
         assert state.contact_area == pressed.contact_area
@@ -51,12 +51,12 @@ def test_those_of_hertz_and_of_cattaneo():
 
 
 def test_those_of_a_cylinder_are_per_length():
-    grid = Grid.strips(1.0, 256)
+    grid = Grid.line_contact(1.0, 256)
     half_space = HalfSpace(grid, ElasticPair(STEEL, STEEL))
     hertz = HertzCylinder(200.0, 50.0, half_space.pair.contact_modulus)
     contact = FrictionalContact(half_space, FRICTION)
     height = hertz.gap(grid.x)
-    state = contact.advance(contact.apart(height), height, ContactLoad(P=200.0, Qx=60.0))
+    state = contact.advance(contact.unloaded_state(height), height, ContactLoad(P=200.0, Qx=60.0))
     assert state.contact_area == pytest.approx(2.0 * hertz.half_width, abs=2.0 * grid.pitch[0])
     stick = ShearedCylinder(hertz, FRICTION).stick_half_width(60.0)
     assert state.stick_area == pytest.approx(2.0 * stick, abs=2.0 * grid.pitch[0])
@@ -76,7 +76,7 @@ def test_work_is_stored_or_dissipated(body):
     half_space, height = on_grid(16, ElasticPair(body, STEEL))
     contact, missing = FrictionalContact(half_space, FRICTION), []
     for increments in (4, 8):
-        state = contact.advance(contact.apart(height), height, ContactLoad(P=0.5 * P))
+        state = contact.advance(contact.unloaded_state(height), height, ContactLoad(P=0.5 * P))
         work, lost, begun = 0.0, 0.0, state.elastic_energy
         for share in np.arange(1, increments + 1) / increments:
             load = ContactLoad(P=0.5 * P * (1.0 + share), Qx=0.8 * FRICTION * P * share**2)

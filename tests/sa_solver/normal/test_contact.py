@@ -34,7 +34,7 @@ def test_resultants_motions_and_energy_add_up():
     The dissipated energy uses the mean pressure of both ends of the increment instead.
     """
     solver = contact()
-    state = solver.apart(HEIGHT)
+    state = solver.unloaded_state(HEIGHT)
     for P, Qx, Qy, Mz in [
         (100.0, 0.0, 0.0, 0.0),
         (300.0, 80.0, 20.0, 3.0),
@@ -63,7 +63,10 @@ def test_energy_is_of_second_order_in_the_increments():
     solver = contact()
     energies = []
     for count in (2, 4, 8, 16, 32):
-        state, energy = solver.advance(solver.apart(HEIGHT), HEIGHT, load(200.0, -30.0)), 0.0
+        state, energy = (
+            solver.advance(solver.unloaded_state(HEIGHT), HEIGHT, load(200.0, -30.0)),
+            0.0,
+        )
         for (P, Q), (P_to, Q_to) in pairwise([(200.0, -30.0), (400.0, 130.0), (200.0, -50.0)]):
             for share in np.linspace(0.0, 1.0, count + 1)[1:]:
                 to = load(P + share * (P_to - P), Q + share * (Q_to - Q))
@@ -79,7 +82,7 @@ def test_energy_is_of_second_order_in_the_increments():
 def test_a_near_state_to_begin_from_changes_the_work_only(second):
     """The surface has worn by a thousandth of the approach since the state of the initial guess."""
     solver = FrictionalContact(HalfSpace(GRID, ElasticPair(TITANIUM, second)), FRICTION)
-    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0, 20.0))
+    pressed = solver.advance(solver.unloaded_state(HEIGHT), HEIGHT, load(300.0, 20.0))
     near = solver.advance(pressed, HEIGHT, load(400.0, 150.0))
     worn = HEIGHT + 1e-6 * near.pressure / near.pressure.max()
     known = solver.advance(pressed, worn, load(400.0, 150.0), near.as_start)
@@ -93,7 +96,7 @@ def test_a_near_state_to_begin_from_changes_the_work_only(second):
 
 def test_motions_bring_the_same_state_as_their_forces():
     solver = contact()
-    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0, 30.0))
+    pressed = solver.advance(solver.unloaded_state(HEIGHT), HEIGHT, load(300.0, 30.0))
     forced = solver.advance(pressed, HEIGHT, load(250.0, 100.0, -20.0, 2.0))
     motion = ContactLoad(forced.rigid, motion=(True,) * 6)
     moved = solver.advance(pressed, HEIGHT, motion)
@@ -104,7 +107,7 @@ def test_motions_bring_the_same_state_as_their_forces():
 
 def test_bodies_that_part_forget_and_carry_nothing():
     solver = contact()
-    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0, 90.0))
+    pressed = solver.advance(solver.unloaded_state(HEIGHT), HEIGHT, load(300.0, 90.0))
     apart = solver.advance(pressed, HEIGHT, load(0.0))
     assert apart.converged
     assert not apart.traction.any()
@@ -114,7 +117,7 @@ def test_bodies_that_part_forget_and_carry_nothing():
 
 def test_sliding_is_decided_by_force_and_energy():
     solver = contact()
-    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
+    pressed = solver.advance(solver.unloaded_state(HEIGHT), HEIGHT, load(300.0))
     limit = FRICTION * 300.0
     energy = np.array([2.0, 0.0])
     partial = solver.advance(pressed, HEIGHT, load(300.0, 0.9 * limit, energy=energy))
@@ -133,7 +136,7 @@ def test_sliding_is_decided_by_force_and_energy():
 def test_a_contact_that_creeps_keeps_its_force():
     """The force is close to its limit, but the energy is less than sliding would dissipate."""
     solver = contact()
-    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
+    pressed = solver.advance(solver.unloaded_state(HEIGHT), HEIGHT, load(300.0))
     held = solver.advance(pressed, HEIGHT, load(300.0, 162.0))
     force = 162.0 / (0.995 * FRICTION)
     creeping = load(force, 162.0, energy=np.array([1e-6, 0.0]))
@@ -147,7 +150,7 @@ def test_a_contact_that_creeps_keeps_its_force():
 
 def test_without_friction_there_is_no_shear():
     solver = contact(0.0)
-    state = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
+    state = solver.advance(solver.unloaded_state(HEIGHT), HEIGHT, load(300.0))
     assert state.converged
     assert not state.shear.any()
 
@@ -161,7 +164,7 @@ def test_friction_without_meaning(friction):
 def test_strain_is_that_of_body_2_over_body_1():
     """Tension in body 2 alone would stretch its surface; the shear by body 1 resists this."""
     solver = contact()
-    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
+    pressed = solver.advance(solver.unloaded_state(HEIGHT), HEIGHT, load(300.0))
     stretched = solver.advance(pressed, HEIGHT, load(300.0, strain=1e-4))
     right = stretched.shear[0][GRID.x[:, 0] > 0.0].sum()
     assert right < 0.0
@@ -175,7 +178,7 @@ def test_surfaces_that_move_evenly_along_x_are_strained(second):
     """Displacements ε x of the surfaces, before they touch and after, are a strain ε."""
     solver = FrictionalContact(HalfSpace(GRID, ElasticPair(TITANIUM, second)), FRICTION)
     stretch = np.stack([1e-4 * np.broadcast_to(GRID.x, GRID.shape), np.zeros(GRID.shape)])
-    moved, strained = solver.apart(HEIGHT, along=-stretch), solver.apart(HEIGHT)
+    moved, strained = solver.unloaded_state(HEIGHT, along=-stretch), solver.unloaded_state(HEIGHT)
     for share, P in ((-0.5, 200.0), (1.0, 300.0), (0.2, 250.0)):
         given = load(P, strain=1e-4 * (1.0 + share))
         strained = solver.advance(strained, HEIGHT, given)
@@ -196,7 +199,7 @@ def test_any_rough_history(seed):
     friction = rng.uniform(0.05, 1.2)
     solver = FrictionalContact(HalfSpace(grid, ElasticPair(material, material)), friction)
     height = 2e-3 * rng.standard_normal(grid.shape) + (grid.x**2 + grid.y**2) / 30.0
-    state = solver.apart(height)
+    state = solver.unloaded_state(height)
     for _ in range(4):
         P = material.young * 10.0 ** rng.uniform(-4.5, -3.0)
         angle, share = rng.uniform(0.0, 2.0 * np.pi), 0.95 * friction * rng.random()

@@ -59,7 +59,7 @@ def test_twisted_sphere(share):
         contact = FrictionalContact(HalfSpace(grid, PAIR), FRICTION)
         height = sphere.contact.gap(grid.x, grid.y)
         load = ContactLoad(np.array([400.0, 0.0, 0.0, 0.0, 0.0, moment]))
-        state = contact.advance(contact.apart(height), height, load)
+        state = contact.advance(contact.unloaded_state(height), height, load)
         expected = sphere.shear(np.hypot(grid.x, grid.y), moment)
         shears.append(mean_square(np.hypot(*state.shear), expected))
         # The edge moves in steps of cells, so that the sign of the error varies: test a bound.
@@ -74,11 +74,11 @@ def test_cylinder_with_bulk_stress(body):
     form = BulkStressedCylinder(cylinder, FRICTION, 100.0, 60.0, body)
     shears = []
     for strips in (64, 128, 256, 512):
-        grid = Grid.strips(2.4 * cylinder.half_width, strips)
+        grid = Grid.line_contact(2.4 * cylinder.half_width, strips)
         contact = FrictionalContact(HalfSpace(grid, PAIR), FRICTION)
         height = cylinder.gap(grid.x)
         pressed = contact.advance(
-            contact.apart(height), height, ContactLoad(np.array([400.0, 0, 0, 0, 0, 0]))
+            contact.unloaded_state(height), height, ContactLoad(np.array([400.0, 0, 0, 0, 0, 0]))
         )
         load = ContactLoad(np.array([400.0, 100.0, 0, 0, 0, 0]), strain=form.mismatch_strain)
         state = contact.advance(pressed, height, load)
@@ -96,7 +96,7 @@ def test_line_contacts_without_friction(form):
     half = getattr(form, "contact_half_width", None) or form.half_width
     pressures = []
     for strips in (128, 256, 512, 1024):
-        grid = Grid.strips(2.3 * half, strips)
+        grid = Grid.line_contact(2.3 * half, strips)
         state = NormalContact(HalfSpace(grid, PAIR)).solve(form.gap(grid.x), 400.0)
         pressures.append(mean_square(state.pressure, form.pressure(grid.x)))
     assert rate(pressures) > 0.7

@@ -92,7 +92,7 @@ LINE = HertzCylinder(120.0, 20.0, PAIR.contact_modulus)
 
 
 def cylinder(count, load=LINE.load, **given):
-    grid = Grid.strips(3.0 * LINE.half_width, count)
+    grid = Grid.line_contact(3.0 * LINE.half_width, count)
     contact = NormalContact(HalfSpace(grid, PAIR, datum=DATUM))
     return grid, contact.solve(LINE.gap(grid.x), load, **given)
 

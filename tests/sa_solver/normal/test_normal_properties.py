@@ -16,7 +16,7 @@ sides = st.floats(1.0, 20.0)
 counts = st.integers(5, 70)
 grids = st.one_of(
     st.builds(lambda a, b, m, n: Grid.covering((a, b), (m, n)), sides, sides, counts, counts),
-    st.builds(Grid.strips, sides, st.integers(5, 300)),
+    st.builds(Grid.line_contact, sides, st.integers(5, 300)),
 )
 materials = st.builds(Material, st.floats(1e3, 4e5), st.floats(0.0, 0.49))
 pairs = st.builds(ElasticPair, materials, materials)

@@ -30,14 +30,14 @@ def cylinder(cells, beta, friction):
     """Return a line contact under P newtons per mm, and its height."""
     pair = rigid_on_elastic(beta)
     half_width = np.sqrt(4 * P * RADIUS / (np.pi * pair.contact_modulus))
-    grid = Grid.strips(2.6 * half_width, cells)
+    grid = Grid.line_contact(2.6 * half_width, cells)
     height = np.broadcast_to(grid.x**2 / (2 * RADIUS), grid.shape)
     return CoupledContact(HalfSpace(grid, pair), friction), height
 
 
 def flat_strip(cells, beta, friction):
     """Return a rigid flat punch with sharp edges in plane strain, and its height."""
-    grid = Grid.strips(1.2, cells)
+    grid = Grid.line_contact(1.2, cells)
     height = np.where(np.abs(grid.x) < 0.5, 0.0, 1.0)
     return CoupledContact(HalfSpace(grid, rigid_on_elastic(beta)), friction), height
 

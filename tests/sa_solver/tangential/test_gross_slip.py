@@ -88,7 +88,7 @@ def test_a_share_that_no_direction_has_is_reported():
 
 
 def test_a_line_contact():
-    grid = Grid.strips(2.0, 64)
+    grid = Grid.line_contact(2.0, 64)
     limit = 300.0 * np.sqrt(np.maximum(0.0, 1.0 - grid.x**2 / 0.8))
     half_space = HalfSpace(grid, HALF_SPACE.pair)
     slid = slide(limit, (3.0, 0.0), (-1.0, 0.0), np.zeros((2, 64, 1)), "force", half_space)

@@ -28,7 +28,7 @@ def ball(poisson, cells=32):
 
 def cylinder(cells=128):
     material = Material(115e3, 0.3)
-    grid = Grid.strips(2.0, cells)
+    grid = Grid.line_contact(2.0, cells)
     return HalfSpace(grid, ElasticPair(material, material)), grid.x**2 / 60.0
 
 
@@ -182,7 +182,7 @@ def test_energy_has_an_error_of_its_own(values, parts, within):
     half_space, height = HalfSpace(grid, ElasticPair(material, material)), grid.x**2 / 20.0
     height, given = height + grid.y**2 / 20.0, ContactLoadPath(values)
     contact = FrictionalContact(half_space, 0.4)
-    state, exact = contact.apart(height), 0.0
+    state, exact = contact.unloaded_state(height), 0.0
     for row in range(len(given)):
         for part in range(1, parts + 1):
             state = contact.advance(state, height, given.load(row, part / parts))
@@ -200,7 +200,7 @@ def test_energy_has_an_error_of_its_own(values, parts, within):
 def test_unlike_bodies_pressed_in_one_increment_stick_as_those_of_a_growing_load(friction):
     """Spence 1968: c/a of any profile is that of a flat strip, which needs no refinement."""
     pair = ElasticPair(Material(np.inf, 0.3), Material(115e3, 0.0))
-    grid = Grid.strips(2.0, 200)
+    grid = Grid.line_contact(2.0, 200)
     pressed = ContactLoadPath(np.array([[LOAD, 0.0, 0.0, 0.0, 0.0, 0.0]]))
 
     def stick_share(height, history="auto"):

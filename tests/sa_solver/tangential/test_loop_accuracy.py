@@ -65,7 +65,7 @@ def test_a_worn_sphere_has_the_stiffness_of_its_contact():
 
 
 def test_a_coarse_loop_that_fails_leaves_nothing_known(monkeypatch):
-    grid = Grid.strips(1.0, 16)
+    grid = Grid.line_contact(1.0, 16)
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), 0.5)
     path = LoopPath(100.0, 30.0, "force", 4)
     height = grid.x**2 / 40.0

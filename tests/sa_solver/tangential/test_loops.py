@@ -69,7 +69,7 @@ steel, grid = Material(210e3, 0.3), Grid.covering((1.0, 1.0), (16, 16))
 contact = FrictionalContact(HalfSpace(grid, ElasticPair(steel, Material(70e3, 0.3))), 0.5)
 height = 0.05 * (grid.x**2 + grid.y**2)
 load = ContactLoad(np.array([100.0, 20.0, 0.0, 0.0, 0.0, 0.0]))
-pressed = contact.advance(contact.apart(height), height, load)
+pressed = contact.advance(contact.unloaded_state(height), height, load)
 assert pressed.converged
 assert "numba" not in sys.modules
 """

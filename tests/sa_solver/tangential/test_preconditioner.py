@@ -11,7 +11,7 @@ from sa_solver.types import ElasticPair, Grid, Material
 TITANIUM = Material(115e3, 0.29)
 PAIR = ElasticPair(TITANIUM, TITANIUM)
 GRID = Grid((12, 7), (0.3, 0.5))
-GRIDS = [GRID, Grid((9, 8), (0.1, 0.9)), Grid.strips(3.0, 24), Grid.strips(3.0, 25)]
+GRIDS = [GRID, Grid((9, 8), (0.1, 0.9)), Grid.line_contact(3.0, 24), Grid.line_contact(3.0, 25)]
 
 
 def as_matrix(apply, grid):

@@ -37,7 +37,7 @@ def sphere(cells, material=TITANIUM, width=0.8, friction=FRICTION):
 def line(cells, material=TITANIUM):
     pair = ElasticPair(material, material)
     contact = HertzCylinder(200.0, 30.0, pair.contact_modulus)
-    grid = Grid.strips(2.5 * contact.half_width, cells)
+    grid = Grid.line_contact(2.5 * contact.half_width, cells)
     limit = FRICTION * contact.pressure(grid.x)
     half_space = HalfSpace(grid, pair)
     limit *= FRICTION * contact.load / (limit.sum() * grid.cell_area)

@@ -38,7 +38,7 @@ def run(case, path, cells=CELLS):
 
 def press_flat(pair, cells, path, friction=FRICTION):
     """Return a flat punch 2 mm wide, in plane strain."""
-    grid = Grid.strips(2.0, cells)
+    grid = Grid.line_contact(2.0, cells)
     contact = FrictionalContact(HalfSpace(grid, pair), friction)
     return march_loop(contact, np.zeros(grid.shape), path)
 
@@ -146,7 +146,7 @@ def test_both_axes_are_equal_for_a_sphere():
 def test_line_contact():
     pair = ElasticPair(TITANIUM, TITANIUM)
     line = ShearedCylinder(HertzCylinder(LOAD, RADIUS, pair.contact_modulus), FRICTION)
-    grid = Grid.strips(2.2 * line.contact.half_width, 128)
+    grid = Grid.line_contact(2.2 * line.contact.half_width, 128)
     contact = FrictionalContact(HalfSpace(grid, pair), FRICTION)
     height = line.contact.gap(grid.x)
     loop = march_loop(contact, height, LoopPath(LOAD, 0.75 * SLIDING, "force", 6))

@@ -10,7 +10,7 @@ from wear.cracking.bulk_stress import RIGID, SIDE, BodyFace
 
 METAL = Material(115e3, 0.29)
 E, NU = METAL.young, METAL.poisson
-AREA, LINE = Grid.covering((2.0, 3.0), (16, 12)), Grid.strips(2.0, 32)
+AREA, LINE = Grid.covering((2.0, 3.0), (16, 12)), Grid.line_contact(2.0, 32)
 DEPTH = 0.02
 
 
@@ -112,7 +112,7 @@ def test_a_half_space_has_nothing_to_add() -> None:
 
 
 def test_few_nodes_tell_nothing() -> None:
-    grid = Grid.strips(1.0, 3)
+    grid = Grid.line_contact(1.0, 3)
     nothing = np.zeros((1, 3, 3))
     face = BodyFace(grid, CellNodes(grid), METAL, 2)
     assert face.bulk_stress(loaded(1, 0.0), nothing, nothing) is None

@@ -22,7 +22,7 @@ from wear.steps.implicit import ImplicitStepper
 BODY, RIGID = Material(100e3, 0.3), Material(np.inf, 0.3)
 # A face of 10 mm and a cylinder that touches 5 of them, in N/mm and mm.
 WIDTH, RADIUS, LOAD = 10.0, 400.0, 300.0
-GRID = Grid.strips(WIDTH, 256)
+GRID = Grid.line_contact(WIDTH, 256)
 GAP = GRID.x**2 / (2.0 * RADIUS)
 PAIR = ElasticPair(RIGID, BODY)
 
@@ -129,7 +129,7 @@ def on_half_space(face: Face) -> CycleLoads:
     x, areas = face.coordinates[:, 0], face.facet_shares
     pressure = np.sqrt(np.maximum(0.0, 1.0 - (x / 2.4) ** 2))
     force = LOAD * pressure * areas / (pressure @ areas)
-    fine = Grid.strips(WIDTH, 4096)
+    fine = Grid.line_contact(WIDTH, 4096)
     transfer = FaceTransfer.between(face, fine)
     deflection = HalfSpace(fine, PAIR).normal(transfer.spread(force))
     return pressed(face, force, transfer.sample(deflection))

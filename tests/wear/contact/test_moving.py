@@ -115,7 +115,7 @@ def test_what_leaves_the_grid_is_refused_with_the_remedy() -> None:
 
 
 def test_motion_along_a_line_contact_counts_for_nothing() -> None:
-    grid = Grid.strips(4.0, 40)
+    grid = Grid.line_contact(4.0, 40)
     field = scattered(11)[:, 15:16]
     along, without = straight((0.1, -3.0), (0.3, 2.0), grid), straight((0.1, 0.0), (0.3, 0.0), grid)
     np.testing.assert_array_equal(along.deposit(field), without.deposit(field))
@@ -145,7 +145,7 @@ def test_a_flat_punch_wears_a_trapezoid_into_the_flat(stroke: float, each_way: i
 
     The cells of the punch, which ends between cells, wear uniformly.
     """
-    grid = Grid.strips(4.0, 80)
+    grid = Grid.line_contact(4.0, 80)
     half_width = 10 * grid.pitch[0]
     punch = np.where(np.abs(grid.x) < half_width, 1.0, 0.0)
     cycle = passages(grid, ways_of_states(reciprocating(stroke, each_way)))
@@ -189,7 +189,7 @@ def test_cells_blur_by_what_is_stated(pitches: float, blur: float | None) -> Non
     A long path that ends between cells in the middle of either has dx²/6 only on average; the paths
     here begin and end on cells. At 1.5 dx blur and motion are equal.
     """
-    grid = Grid.strips(61.0, 61)
+    grid = Grid.line_contact(61.0, 61)
     point = np.zeros(grid.shape)
     point[30] = 1.0
     spread = straight((-0.5 * pitches, 0.0), (0.5 * pitches, 0.0), grid).deposit(point)
@@ -256,7 +256,7 @@ def test_motion_without_contact_does_not_count() -> None:
 
 
 def test_motion_of_a_line_contact_along_itself_does_not_count() -> None:
-    grid = Grid.strips(4.0, 40)
+    grid = Grid.line_contact(4.0, 40)
     path = reciprocating(1.0, 2)[:, ::-1]
     assert not moves(path, np.ones(grid.shape, dtype=bool), grid)
 

@@ -109,8 +109,8 @@ def test_a_coefficient_may_change_during_a_step(scope) -> None:
     law = EvolvingLaw(EnergyLaw(2e-8), table, scope)
     contact = NodalContact((law, law), (Cycle(PATHS, PRESSURE),))
     once, _ = contact.wear(unworn(), cycles)
-    spent = FRICTION * SLID * cycles
-    ended = spent if scope == "local" else float(spent @ AREAS)
+    cost = FRICTION * SLID * cycles
+    ended = cost if scope == "local" else float(cost @ AREAS)
     assert np.max(ended) < 20.0
     np.testing.assert_allclose(once, (1.0 + 0.1 * ended) * 2e-8 * FRICTION * SLID, rtol=1e-13)
 
@@ -163,8 +163,8 @@ def test_heuns_steps_keep_to_tolerance_and_limit_and_say_what_they_leave(life) -
         assert true / 3.0 < estimate["depth"] < 3.0 * true
         true = abs(float(AREAS @ wrong)) / float(AREAS @ wanted)
         assert true / 3.0 < estimate["volume"] < 3.0 * true
-        assert all(step.spent.steps == 2 for step in taken)
-        assert all(step.spent.contact_solves % 6 == 0 for step in taken)
+        assert all(step.cost.steps == 2 for step in taken)
+        assert all(step.cost.contact_solves % 6 == 0 for step in taken)
         counts.append(len(taken))
     assert counts == sorted(counts)
 
@@ -172,8 +172,8 @@ def test_heuns_steps_keep_to_tolerance_and_limit_and_say_what_they_leave(life) -
 def test_explicit_steps_of_a_share_of_the_limit() -> None:
     limit = springs(unworn()).stable_cycles(unworn())
     done = advance_cycles(ExplicitStepper(0.25), unworn(), 10.1 * limit, 10.1 * limit, springs)
-    assert done.spent.steps == 41
-    assert done.spent.contact_solves == 41
+    assert done.cost.steps == 41
+    assert done.cost.contact_solves == 41
 
 
 def test_given_steps_beyond_the_limit_are_refused() -> None:
@@ -218,7 +218,7 @@ def test_stretches_ask_before_each_of_them() -> None:
         springs,
     )
     np.testing.assert_allclose(asked, [6.0 * length, 3.5 * length, length])
-    assert done.spent.steps == 3 + 3 + 1
+    assert done.cost.steps == 3 + 3 + 1
 
 
 @pytest.mark.parametrize("stepper", [ExplicitStepper(0.5), HeunStepper(0.1)])

@@ -70,7 +70,7 @@ def test_an_inclined_punch_is_held_by_the_moment_of_its_closed_form() -> None:
 
     On a half-plane the pressure E* α x/2√(a² - x²) displaces by αx; ∫ x p dx is its moment.
     """
-    grid, half, slope, load = Grid.strips(1.2, 240), 0.5, 1e-4, 50.0
+    grid, half, slope, load = Grid.line_contact(1.2, 240), 0.5, 1e-4, 50.0
     strip = np.where(np.abs(grid.x) < half, slope * grid.x, 1.0)
     history = reciprocating(grid, load, 0.01, 1)
     moments = {}
@@ -120,7 +120,7 @@ def test_the_moments_that_hold_a_tilt_leave_none_when_they_are_imposed(method, o
 
 def test_a_groove_holds_in_mirrored_places_by_opposite_moments() -> None:
     """Off centre by the same distance on either side the moments are opposite, in the middle 0."""
-    grid = Grid.strips(1.0, 100)
+    grid = Grid.line_contact(1.0, 100)
     groove = 2e-4 * np.exp(-((grid.x / 0.05) ** 2))
     contact = NormalContact(HalfSpace(grid, PAIR))
     moments = [
@@ -157,7 +157,7 @@ def test_an_inclined_strip_wears_off_its_slope_where_it_is_held(tilt: Tilt) -> N
 
     W = δ - h - u with u of a uniform pressure, which is even.
     """
-    grid, slope = Grid.strips(1.2, 48), 1e-4
+    grid, slope = Grid.line_contact(1.2, 48), 1e-4
     on = (np.abs(grid.x) < 0.5).ravel()
     contact = interface(grid, np.where(on[:, None], slope * grid.x, 1.0), tilt, follow=False)
     state, energy = worn(contact, reciprocating(grid, 50.0, 0.02, 1), 1e7, 40)
@@ -174,7 +174,7 @@ def in_a_model_of_its_own(
     cells_across: int, load: float, each_way: int, cells: int, cycles: float, steps: int
 ) -> tuple[Array, Array]:
     """Return the depths of flat and cylinder on cells of 10 µm, by the oracle's explicit steps."""
-    form = (Grid.strips(0.01 * cells_across, cells_across).x ** 2 / (2.0 * RADIUS)).ravel()
+    form = (Grid.line_contact(0.01 * cells_across, cells_across).x ** 2 / (2.0 * RADIUS)).ravel()
     rate = COEFFICIENT * FRICTION * cells * 0.01 * cycles / steps
     return wear_without_tilt(form, 0.01, PAIR.contact_modulus, load, each_way, cells, rate, steps)
 
@@ -193,7 +193,7 @@ def test_a_sliding_cylinder_wears_as_in_a_model_of_its_own(stepper, jumps: int) 
     The stroke of 120 µm is a third of the scar. Free to tilt, the flat wears 8.5 % deeper and the
     cylinder 3.5 % less; volumes are exact in any case.
     """
-    grid, load, each_way, cells, cycles = Grid.strips(0.6, 60), 18.5, 2, 6, 4e3
+    grid, load, each_way, cells, cycles = Grid.line_contact(0.6, 60), 18.5, 2, 6, 4e3
     stroke, form = each_way * cells * 0.01, (grid.x**2 / (2.0 * RADIUS)).ravel()
     expected = in_a_model_of_its_own(60, load, each_way, cells, cycles, 200)
     contact = interface(grid, form[:, None], "held", stepper=stepper, follow=True)
@@ -207,7 +207,7 @@ def test_a_sliding_cylinder_wears_as_in_a_model_of_its_own(stepper, jumps: int) 
 @pytest.mark.parametrize("kind", [ImplicitStepper, SecondOrderStepper])
 def test_steps_of_moving_surfaces_say_what_they_leave(kind) -> None:
     """The estimated error of either depth is within a factor of three, and near the tolerance."""
-    grid, load, each_way, cells, cycles = Grid.strips(0.72, 72), 18.5, 2, 6, 1e4
+    grid, load, each_way, cells, cycles = Grid.line_contact(0.72, 72), 18.5, 2, 6, 1e4
     stroke, form = each_way * cells * 0.01, (grid.x**2 / (2.0 * RADIUS)).ravel()
     expected = in_a_model_of_its_own(72, load, each_way, cells, cycles, 400)
     contact = interface(grid, form[:, None], "held", stepper=kind(ErrorControl(0.01)), follow=True)
@@ -227,7 +227,7 @@ def test_friction_of_the_half_space_wears_a_held_cylinder_equally(other) -> None
 
     Free to tilt, the flat wears 7 to 9 % deeper by either method.
     """
-    grid, pair = Grid.strips(0.6, 40), ElasticPair(BODY, other)
+    grid, pair = Grid.line_contact(0.6, 40), ElasticPair(BODY, other)
     history = reciprocating(grid, 18.5, 0.12, 2)
     ends = {}
     for method in ("normal", "full"):
@@ -243,7 +243,7 @@ def test_friction_of_the_half_space_wears_a_held_cylinder_equally(other) -> None
 
 def test_what_is_symmetric_does_not_care() -> None:
     """A cylinder with small motion wears the same held and free, within the solver's tolerance."""
-    grid = Grid.strips(0.72, 72)
+    grid = Grid.line_contact(0.72, 72)
     history = reciprocating(grid, 18.5, 0.01, 2)
     held, free = (
         worn(interface(grid, grid.x**2 / 12.0, tilt, follow=False), history, 1e4, 5)[0].surfaces

@@ -143,7 +143,7 @@ def test_held_parameters_stay_and_nonsense_is_refused():
 @pytest.mark.slow
 @pytest.mark.parametrize("paper", ["Fantetti", "test 4"])
 def test_true_parameters_are_within_their_bounds_in_95_of_100_trials(paper):
-    trials, hits, doubts = 100, {}, 0
+    trials, hits, plausibility_warnings = 100, {}, 0
     truth = FANTETTI if paper == "Fantetti" else LI[paper]
     low, high = binom.interval(0.9999, trials, 0.95)
     for trial in range(trials):
@@ -156,11 +156,11 @@ def test_true_parameters_are_within_their_bounds_in_95_of_100_trials(paper):
             table = li_table(truth, energy, 0.003, rng)
             problem = evolution_problem(table, ["rate", "second_rate"]).problem
         found = fit(problem)
-        doubts += len(diagnose(found, np.tile(energy, 3)))
+        plausibility_warnings += len(diagnose(found, np.tile(energy, 3)))
         for one in found.estimates:
             within = one.bounds[0] <= truth[one.name] <= one.bounds[1]
             hits[one.name] = hits.get(one.name, 0) + within
     assert hits.keys() == truth.keys()
     assert all(low <= count <= high for count in hits.values()), hits
     # Four tests of three series with a rate of one in a thousand each.
-    assert doubts <= 5
+    assert plausibility_warnings <= 5

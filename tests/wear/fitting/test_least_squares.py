@@ -92,12 +92,12 @@ def test_products_quotients_and_what_does_not_count_are_named():
         [np.array([1.0, 3.0, 2.0, 1.0])],
     )
     a, b, c, d = fit(problem).estimates
-    assert (a.doubt, b.doubt) == (
+    assert (a.caveat, b.caveat) == (
         "only its product with b counts",
         "only its product with a counts",
     )
-    assert c.doubt == "only its quotient by a counts"
-    assert d.doubt == "the data do not depend on it"
+    assert c.caveat == "only its quotient by a counts"
+    assert d.caveat == "the data do not depend on it"
     assert np.isnan([one.deviation for one in (a, b, c, d)]).all()
 
 
@@ -110,11 +110,11 @@ def test_a_parameter_at_its_bound_is_reported():
         [np.array([0.0, 1.0])],
     )
     start, slope = fit(held).estimates
-    assert slope.doubt == "at its lower bound"
+    assert slope.caveat == "at its lower bound"
     # The other parameter is estimated as without a slope: a mean.
     assert start.value == pytest.approx((y + NOISE).mean(), rel=1e-3)
     mean_error = np.std(y + NOISE, ddof=1) / np.sqrt(len(y))
-    assert start.doubt or start.deviation == pytest.approx(mean_error, rel=1e-3)
+    assert start.caveat or start.deviation == pytest.approx(mean_error, rel=1e-3)
 
 
 def test_what_makes_no_fit_is_refused():

@@ -74,12 +74,12 @@ OFF = re.compile(rb"^( *)# ?( *(?:- )?\w+:)")
 
 @dataclass(frozen=True)
 class Mutant:
-    """Case with a random change, which ``told`` describes to help find the cause of a failure."""
+    """Case with a random change, which ``reported`` describes to find the cause of a failure."""
 
     number: int
     text: bytes
     overrides: tuple[str, ...]
-    told: str
+    reported: str
 
 
 def sources() -> dict[str, str]:
@@ -100,23 +100,23 @@ class Mutants:
         chance = random.Random(number)
         name = chance.choice(list(self._texts))
         way = chance.choices((self._in_the_tree, self._in_the_text, self._overridden), (7, 2, 2))[0]
-        text, overrides, told = way(chance, name)
-        return Mutant(number, text, overrides, f"{name}: {told}")
+        text, overrides, reported = way(chance, name)
+        return Mutant(number, text, overrides, f"{name}: {reported}")
 
     # --- ways ------------------------------------------------------------------------------------
 
     def _in_the_tree(self, chance: random.Random, name: str) -> tuple[bytes, tuple[str, ...], str]:
-        tree, told = copy.deepcopy(self._trees[name]), []
+        tree, reported = copy.deepcopy(self._trees[name]), []
         for _ in range(chance.choice((1, 1, 1, 2, 3))):
-            told.append(self._change(chance, tree))
-        return written(tree).encode("utf-8", "surrogatepass"), (), ", ".join(told)
+            reported.append(self._change(chance, tree))
+        return written(tree).encode("utf-8", "surrogatepass"), (), ", ".join(reported)
 
     def _in_the_text(self, chance: random.Random, name: str) -> tuple[bytes, tuple[str, ...], str]:
-        raw, told = self._texts[name].encode(), []
+        raw, reported = self._texts[name].encode(), []
         for _ in range(chance.choice((1, 1, 2, 5))):
             raw, how = _edited(chance, raw)
-            told.append(how)
-        return raw, (), ", ".join(told)
+            reported.append(how)
+        return raw, (), ", ".join(reported)
 
     def _overridden(self, chance: random.Random, name: str) -> tuple[bytes, tuple[str, ...], str]:
         tree = self._trees[name]

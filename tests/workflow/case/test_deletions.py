@@ -20,7 +20,7 @@ from workflow.kinds import kinds, load_case, parse_case, template
 QUICK = "joint", "line"
 
 
-def told(case: Case) -> list[tuple[str, str]]:
+def reported(case: Case) -> list[tuple[str, str]]:
     return [*case.outline(), *taken(case)]
 
 
@@ -46,7 +46,7 @@ def test_whatever_is_left_out_is_asked_for_or_told(kind: str, folders: dict[str,
         except CaseError as error:
             named = any(str(key) in str(error) for key in place)
         else:
-            named = case == whole or told(case) != told(whole)
+            named = case == whole or reported(case) != reported(whole)
         if not named:
             unnamed.append(".".join(map(str, place)))
     assert not unnamed

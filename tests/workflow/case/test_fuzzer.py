@@ -72,9 +72,9 @@ def faults(mutant: Mutant, path: Path) -> Iterator[str]:
         yield f"exit code {ended.exit_code}"
 
 
-def _of_a_refusal(path: Path, said: str) -> Iterator[str]:
+def _of_a_refusal(path: Path, printed: str) -> Iterator[str]:
     """Yield faults of a refusal; every line must name a line, a file or an override."""
-    lines = said.removesuffix("\n").split("\n")
+    lines = printed.removesuffix("\n").split("\n")
     place = re.compile(rf"fretscale: ({re.escape(str(path))}(:\d+)?|--set .*?): \S")
     yield from (f"no place: {line}" for line in lines if not place.match(line))
     yield from (f"unprintable: {line!r}" for line in lines if not line.isprintable())
@@ -83,9 +83,9 @@ def _of_a_refusal(path: Path, said: str) -> Iterator[str]:
         yield f"{len(lines)} lines"
 
 
-def _of_an_accepted_one(mutant: Mutant, path: Path, said: str) -> Iterator[str]:
+def _of_an_accepted_one(mutant: Mutant, path: Path, printed: str) -> Iterator[str]:
     """Yield faults of an accepted case; it must have only numbers and be read back unchanged."""
-    outline = said.partition("\n")[2]
+    outline = printed.partition("\n")[2]
     if re.search(r"\b(nan|inf|None)\b", outline):
         yield f"no numbers: {outline}"
     case = load_case(path, mutant.overrides)
@@ -102,8 +102,8 @@ def test_whatever_is_wrong_is_told_in_its_place(block: int, folder: Path, mutant
             with alarm(ENDLESS):
                 found = list(faults(mutant, folder / "mutant.yaml"))
         except (Exception, TooLong) as error:
-            raise AssertionError(f"mutant {number}: {mutant.told}") from error
-        assert not found, f"mutant {number}: {mutant.told}"
+            raise AssertionError(f"mutant {number}: {mutant.reported}") from error
+        assert not found, f"mutant {number}: {mutant.reported}"
 
 
 class TooLong(BaseException):
@@ -152,16 +152,16 @@ def test_what_is_accepted_runs_or_says_why_not(tmp_path: Path) -> None:
             return
         if mutant.overrides or checked(mutant, path).exit_code:
             continue
-        told, looked_at = f"mutant {number}: {mutant.told}", looked_at + 1
+        reported, looked_at = f"mutant {number}: {mutant.reported}", looked_at + 1
         try:
             with alarm(ENOUGH):
                 ended = command("run", path, "--out", out)
         except TooLong:
             continue
         except Exception as error:
-            raise AssertionError(told) from error
-        assert ended.exit_code in (0, 2, 3, 4), (told, ended.stderr)
-        assert "Traceback" not in ended.stderr, (told, ended.stderr)
+            raise AssertionError(reported) from error
+        assert ended.exit_code in (0, 2, 3, 4), (reported, ended.stderr)
+        assert "Traceback" not in ended.stderr, (reported, ended.stderr)
         if ended.exit_code == 0:
             summary = json.loads((out / "summary.json").read_bytes())
-            assert all(map(math.isfinite, _numbers(summary))), told
+            assert all(map(math.isfinite, _numbers(summary))), reported

@@ -147,7 +147,7 @@ def test_whatever_the_loader_takes_is_valid(validator, block, folders):
         except (CaseError, UnicodeDecodeError, ValueError):
             continue
         if not validator.is_valid(data):
-            wrong.append(f"{number}: {mutant.told}")
+            wrong.append(f"{number}: {mutant.reported}")
     assert not wrong
 
 

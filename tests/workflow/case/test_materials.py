@@ -98,10 +98,10 @@ def test_anything_else_is_refused_in_one_line(dovetail_path, wrong):
 
 
 def test_density_is_for_what_has_inertia(dovetail_path):
-    told = "nothing here depends on mass; allowed: leave it out"
+    reported = "nothing here depends on mass; allowed: leave it out"
     for case in ("sphere_normal", "sphere_wear", "cylinder_wear", "line_bulk_stress"):
         line = refused(CASES / f"{case}.yaml", "materials.body_1.density=4430 kg/m^3")
-        assert line.endswith(told), line
+        assert line.endswith(reported), line
     line = refused(dovetail_path, "materials.blade={young: 1 GPa, poisson: 0.3}")
     assert "materials.blade.density: missing; allowed: mass per volume" in line
 

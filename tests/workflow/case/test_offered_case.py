@@ -240,7 +240,7 @@ def test_a_load_to_fill_in_has_a_factor_for_each_leg(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ("206843.5, 0.29", "2.1e11, 0.29", "is the file in other units?"),
         ("*Elastic\n", "*Elastic, type=ORTHOTROPIC\n", "bodies are isotropic"),
@@ -267,10 +267,10 @@ def test_a_load_to_fill_in_has_a_factor_for_each_leg(tmp_path):
          "Foot-1.foot_high, P", "not understood"),
     ],
 )  # fmt: skip
-def test_what_is_not_taken_is_told(tmp_path, old, new, told):
+def test_what_is_not_taken_is_told(tmp_path, old, new, reported):
     assert old in MODEL
     _, ignored = offered(deck(tmp_path, MODEL.replace(old, new, 1)))
-    assert any(told in line for line in ignored), ignored
+    assert any(reported in line for line in ignored), ignored
 
 
 def test_a_thickness_is_told(tmp_path):
@@ -379,7 +379,7 @@ def test_a_nastran_deck_becomes_a_case(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         (("PLOAD4,3,2,25.,,", "PLOAD4,3,2,25.,30.,"), "not the same at all corners"),
         (("FORCE,3,14,,2.", "FORCE,3,14,,3."), "forces of force_3 that differ: their sum"),
@@ -389,6 +389,6 @@ def test_a_nastran_deck_becomes_a_case(tmp_path):
         (("FORCE,3,13", "FORCE,6,13"), "load sets 3, 6: all are taken, together"),
     ],
 )
-def test_what_a_nastran_deck_does_not_give_is_told(tmp_path, change, told):
+def test_what_a_nastran_deck_does_not_give_is_told(tmp_path, change, reported):
     _, ignored = offered(bulk(tmp_path, change=change))
-    assert any(told in line for line in ignored), ignored
+    assert any(reported in line for line in ignored), ignored

@@ -34,7 +34,7 @@ def test_grids_of_areas_are_two_numbers(name, grid):
 
 
 @pytest.mark.parametrize(
-    ("name", "override", "told"),
+    ("name", "override", "reported"),
     [
         ("specimens_coarse", "load_path.P=60 N", "allowed: normal_forces, one after the other"),
         ("dovetail_2d", "load_path.peak_at=8", "the first leg of increments: [8, 14]"),
@@ -42,12 +42,12 @@ def test_grids_of_areas_are_two_numbers(name, grid):
         ("sphere_wear", "wear.body_1.specific_wear_rate=1e-9", "coefficient, which is that rate"),
     ],
 )
-def test_the_key_of_another_case_is_answered_with_ours(name, override, told):
+def test_the_key_of_another_case_is_answered_with_ours(name, override, reported):
     with pytest.raises(CaseError) as refused:
         load_case(CASES / f"{name}.yaml", [override])
     (line,) = str(refused.value).splitlines()
     assert line.startswith(f"--set {override}: ")
-    assert told in line
+    assert reported in line
 
 
 def test_cases_of_the_plane_take_one_size(tmp_path):

@@ -209,8 +209,8 @@ def test_templates_tell_editors_of_the_schema():
 def test_every_comment_of_a_sweep_may_be_opened(tmp_path, dovetail_text):
     (tmp_path / "my.yaml").write_text(dovetail_text, encoding="utf-8")
     (tmp_path / "wear").mkdir()
-    told = told_by_fit(entries=["wear.disk.coefficient"])
-    (tmp_path / "wear" / "summary.json").write_text(json.dumps(told), encoding="utf-8")
+    reported = told_by_fit(entries=["wear.disk.coefficient"])
+    (tmp_path / "wear" / "summary.json").write_text(json.dumps(reported), encoding="utf-8")
     sweep = tmp_path / "sweep.yaml"
     grid, sample = sweep_template(), sweep_template().replace("design: grid", "design: sample")
     sample = sample.replace("# samples: 50", "samples: 50")

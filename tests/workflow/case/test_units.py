@@ -65,14 +65,14 @@ def test_they_need_no_pint(text, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         ("1 mm³/N·m", "cannot be converted to 1/MPa; use brackets for all that is below /"),
         ("1×10^-8 1/MPa", "power of ten; write 1e-8"),
         ("1 mm^3", "cannot be converted to 1/MPa"),
     ],
 )
-def test_what_is_wrong_with_a_rate_is_told(text, told):
+def test_what_is_wrong_with_a_rate_is_told(text, reported):
     with pytest.raises(units.UnitError) as error:
         units.to_base(text, "1/MPa")
-    assert str(error.value).endswith(told)
+    assert str(error.value).endswith(reported)

@@ -89,7 +89,7 @@ def test_command_writes_text_table_page_and_curves(runs, tmp_path):
     page = Page((out / "compare.html").read_text("utf-8"))
     assert "script" not in page.tags
     assert len(page.images) == 4
-    assert "friction.coefficient" in page.told["Differences of their cases"]
+    assert "friction.coefficient" in page.reported["Differences of their cases"]
     again = invoke(*command)
     assert (again.exit_code, "exists; give another folder, or --force" in again.stderr) == (2, True)
 

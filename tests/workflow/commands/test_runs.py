@@ -23,7 +23,7 @@ from workflow.runs import job as runs_job
 from workflow.runs.job import Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.provenance import provenance_of
-from workflow.runs.run import kept_in
+from workflow.runs.run import stored_run
 from workflow.shell.folders.folder import OutputFolder
 
 QUIET = "output: {paraview: false, figures: false}\n"
@@ -79,9 +79,9 @@ def test_failures_are_values_and_stop_nobody(contact, tmp_path):
         Job("wrong", contact, ("friction.coefficient=-1",)),
         Job("good", contact),
     ]
-    told = []
-    slides, wrong, good = run_jobs(jobs, tmp_path / "out", report=told.append)
-    assert {result.job.name for result in told} == {"slides", "wrong", "good"}
+    reported = []
+    slides, wrong, good = run_jobs(jobs, tmp_path / "out", report=reported.append)
+    assert {result.job.name for result in reported} == {"slides", "wrong", "good"}
     assert slides.summary is None
     assert "friction cannot carry Qx" in slides.error
     assert "--set friction.coefficient=-1: -1: out of range" in wrong.error
@@ -100,7 +100,7 @@ def test_a_finished_run_stays_and_another_case_takes_its_place(contact, here, tm
     assert again.summary == first.summary
     assert (out / "one/summary.json").stat().st_mtime_ns == written
     other = Job("one", contact, ("load_path.legs.0.P=500 N",))
-    assert kept_in(out / "one", other.load()) == "other"
+    assert stored_run(out / "one", other.load()) == "other"
     (changed,) = run_jobs([other], out)
     assert changed.summary["states"][-1]["P"] == pytest.approx(500.0, rel=1e-6)
 
@@ -109,7 +109,7 @@ def test_case_in_the_words_of_another_version_is_the_same(contact, here, tmp_pat
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     case = done.folder / "case.yaml"
     case.write_text(case.read_text("utf-8").replace("#", "# formerly:"), encoding="utf-8")
-    assert kept_in(done.folder, load_case(contact)) == "finished"
+    assert stored_run(done.folder, load_case(contact)) == "finished"
 
 
 def test_what_is_no_run_is_left_alone(contact, here, tmp_path):
@@ -127,18 +127,18 @@ def test_names_are_folders_of_their_own(contact, tmp_path, names):
 
 
 @pytest.mark.parametrize(
-    ("code", "told"),
+    ("code", "reported"),
     [
         ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "signal 9"),
         ("raise SystemError('broken')", "exit code 1: SystemError: broken"),
         ("pass", "exit code 0"),
     ],
 )
-def test_a_process_that_ends_early_is_a_failure(contact, tmp_path, monkeypatch, code, told):
+def test_a_process_that_ends_early_is_a_failure(contact, tmp_path, monkeypatch, code, reported):
     monkeypatch.setattr(runs_job, "COMMAND", code)
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     assert done.summary is None
-    assert told in done.error
+    assert reported in done.error
 
 
 @pytest.mark.slow
@@ -172,7 +172,7 @@ def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
 
     wants, used, most = {"a": 2, "b": 1, "c": 1, "d": 3, "e": 9}, [], []
 
-    def pretend(job, out, unwanted, one_thread):
+    def pretend(job, out, abandoned, one_thread):
         used.append(job.name)
         most.append(sum(min(wants[name], 3) for name in used))
         time.sleep(0.05)
@@ -279,7 +279,7 @@ def test_whoever_is_killed_leaves_a_run_to_take_up(wear, tmp_path):
         wait_until(lambda pids=descendants: not any(map(alive, pids)))
         reached = max(int(path.stem) for path in (out / "one/jumps").glob("[0-9]*.h5"))
     case = load_case(wear, (MANY,))
-    assert kept_in(out / "one", case) == "unfinished"
+    assert stored_run(out / "one", case) == "unfinished"
     jobs = [Job("one", wear, (MANY,)), Job("untouched", wear, (MANY,))]
     taken_up, untouched = run_jobs(jobs, out)
     assert (out / "one/run.log").read_text("utf-8").count("resume: ") == 2
@@ -292,7 +292,7 @@ def test_a_damaged_state_is_started_again(wear, here, tmp_path):
     folder = OutputFolder(done.folder)
     folder.summary.unlink()
     folder.checkpoint.write_bytes(folder.checkpoint.read_bytes()[:1000])
-    assert kept_in(done.folder, job.load()) == "nothing"
+    assert stored_run(done.folder, job.load()) == "nothing"
     (again,) = run_jobs([job], tmp_path / "out")
     assert without_times(again.summary) == without_times(done.summary)
 
@@ -305,8 +305,8 @@ def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, here, tmp_p
     record = {"choice": {"chosen": {"contact.grid": [32, 8]}}}
     folder.finish(done.summary | record, provenance_of(folder, job.load()))
     asked = load_case(wear, ("contact.grid=[64, 16]",))
-    assert kept_in(done.folder, asked) == "finished"
-    assert kept_in(done.folder, load_case(wear, ("friction.coefficient=0.6",))) == "other"
+    assert stored_run(done.folder, asked) == "finished"
+    assert stored_run(done.folder, load_case(wear, ("friction.coefficient=0.6",))) == "other"
 
 
 # --- a cluster ------------------------------------------------------------------------------------
@@ -360,8 +360,10 @@ def test_the_first_worker_may_come_late(contact, tmp_path, impatient, caplog):
         address = cluster.scheduler_address
         (done,) = run_jobs([Job("one", contact)], tmp_path / "out", dask=address)
     assert not done.error
-    (told,) = (record.getMessage() for record in caplog.records if record.name[:8] == "workflow")
-    assert told == (
+    (reported,) = (
+        record.getMessage() for record in caplog.records if record.name[:8] == "workflow"
+    )
+    assert reported == (
         f"--dask {address}: no worker yet, 1 of 1 runs wait for one; Ctrl-C ends it, what is done "
         "is kept"
     )
@@ -385,9 +387,11 @@ def test_workers_that_have_all_gone_are_told_and_given_up(wear, tmp_path, impati
         with pytest.raises(MethodFailed, match=r"no worker for .*, 1 of 1 runs"):
             run_jobs([job], out, dask=cluster.scheduler_address)
         gone.result()
-    (told,) = (record.getMessage() for record in caplog.records if record.name[:8] == "workflow")
-    assert "no worker is left, 1 of 1 runs wait for one; given up after a few seconds" in told
-    assert kept_in(out / "one", job.load()) == "unfinished"
+    (reported,) = (
+        record.getMessage() for record in caplog.records if record.name[:8] == "workflow"
+    )
+    assert "no worker is left, 1 of 1 runs wait for one; given up after a few seconds" in reported
+    assert stored_run(out / "one", job.load()) == "unfinished"
 
 
 @pytest.mark.slow
@@ -414,18 +418,18 @@ def test_a_worker_killed_at_work_changes_nothing(contact, wear, tmp_path):
         for number, entry in enumerate(coefficients)
     ]
     jobs.append(Job("slides", contact, ("load_path.legs.0.P=100 N",)))
-    out, told = tmp_path / "cluster", []
+    out, reported = tmp_path / "cluster", []
     cluster = distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     )
     with cluster, ThreadPoolExecutor() as beside:
         workers = [nanny.pid for nanny in cluster.workers.values()]
         killed = beside.submit(kill_at_work, workers, out / "run0")
-        results = run_jobs(jobs, out, dask=cluster.scheduler_address, report=told.append)
+        results = run_jobs(jobs, out, dask=cluster.scheduler_address, report=reported.append)
         assert killed.result() in workers
     # Whether there was a state to go on from, the clock decides; it was taken over once.
     assert (out / "run0/run.log").read_text("utf-8").count("is gone and left its lock") == 1
-    assert len(told) == len(jobs)
+    assert len(reported) == len(jobs)
     for one, other in zip(results, run_jobs(jobs, tmp_path / "here"), strict=True):
         if one.job.name == "slides":
             assert "friction cannot carry" in one.error

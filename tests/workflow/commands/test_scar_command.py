@@ -48,9 +48,9 @@ def test_two_scans_give_volume_table_map_and_figure(pair, tmp_path):
     *paths, volume = pair
     done = command("scar", *paths, "--out", tmp_path / "out")
     assert (done.exit_code, done.stderr) == (0, "")
-    told = done.stdout.splitlines()[0].split()
-    assert told[0] == "volume"
-    assert abs(float(told[1]) - 1e9 * volume) < float(told[3]) < 0.01e9 * volume
+    reported = done.stdout.splitlines()[0].split()
+    assert reported[0] == "volume"
+    assert abs(float(reported[1]) - 1e9 * volume) < float(reported[3]) < 0.01e9 * volume
     assert "aligned: the second lies" in done.stdout
     table = read_table_file(tmp_path / "out" / "scar.csv")
     assert float(table.cells("value")[0]) == pytest.approx(volume, rel=0.01)

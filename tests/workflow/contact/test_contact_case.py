@@ -178,9 +178,11 @@ def test_file_and_legs_are_the_same_path(tmp_path, heading, load):
 def test_wrong_path_file_is_told_with_both_lines(tmp_path, content, line, words):
     file = tmp_path / "history.csv"
     file.write_text(content, encoding="utf-8")
-    told = refusal(with_file(BALL), tmp_path / "case.yaml")
-    assert told.startswith(f"{tmp_path / 'case.yaml'}:8: load_path.file: {file}:{line}: "), told
-    assert words in told
+    reported = refusal(with_file(BALL), tmp_path / "case.yaml")
+    assert reported.startswith(f"{tmp_path / 'case.yaml'}:8: load_path.file: {file}:{line}: "), (
+        reported
+    )
+    assert words in reported
 
 
 @pytest.mark.parametrize(
@@ -188,9 +190,9 @@ def test_wrong_path_file_is_told_with_both_lines(tmp_path, content, line, words)
 )
 def test_columns_of_a_path_file_must_agree(tmp_path, content, words):
     (tmp_path / "history.csv").write_text(content, encoding="utf-8")
-    told = refusal(with_file(BALL), tmp_path / "case.yaml")
-    assert f"{tmp_path / 'case.yaml'}:8: load_path.file: " in told
-    assert words in told
+    reported = refusal(with_file(BALL), tmp_path / "case.yaml")
+    assert f"{tmp_path / 'case.yaml'}:8: load_path.file: " in reported
+    assert words in reported
 
 
 def test_path_file_of_a_line_has_no_moment_about_x(tmp_path):
@@ -250,8 +252,11 @@ def test_heights_of_one_column_are_a_line_contact(tmp_path):
 
 def test_heights_on_another_grid_are_refused(tmp_path, heights):
     text = BALL.replace("shape: sphere, radius: 10 mm", "shape: heights, file: gap.npy")
-    told = refusal(text.replace("[16, 16]", "[16, 32]"), tmp_path / "case.yaml")
-    assert "contact.grid: 16 x 32 cells: the file of heights has 16 x 16; allowed: [16, 16]" in told
+    reported = refusal(text.replace("[16, 16]", "[16, 32]"), tmp_path / "case.yaml")
+    assert (
+        "contact.grid: 16 x 32 cells: the file of heights has 16 x 16; allowed: [16, 16]"
+        in reported
+    )
 
 
 @pytest.mark.parametrize(
@@ -269,9 +274,9 @@ def test_heights_on_another_grid_are_refused(tmp_path, heights):
 def test_wrong_heights_are_told(tmp_path, name, content, words):
     (tmp_path / name.split(":")[0]).write_bytes(content)
     text = BALL.replace("shape: sphere, radius: 10 mm", f"shape: heights, file: '{name}'")
-    told = refusal(text, tmp_path / "case.yaml")
-    assert words in told
-    assert ":3: structure.file: " in told
+    reported = refusal(text, tmp_path / "case.yaml")
+    assert words in reported
+    assert ":3: structure.file: " in reported
 
 
 def test_heights_that_are_no_numbers_are_told(tmp_path):

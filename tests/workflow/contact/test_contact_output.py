@@ -150,7 +150,7 @@ def test_torsion_has_no_radial_shear():
 
 
 def test_line_has_half_widths_and_the_centre_of_its_stick_zone():
-    grid = Grid.strips(2.0, 400)
+    grid = Grid.line_contact(2.0, 400)
     pressure = 100.0 * np.sqrt(np.maximum(0.0, 1.0 - (grid.x / 0.8) ** 2))
     stuck = np.abs(grid.x - 0.1) < 0.3
     shear = np.where(stuck, 0.0, FRICTION * pressure)
@@ -298,7 +298,7 @@ def test_paraview_steps_through_the_increments(outcome, folder, tmp_path):
 def test_line_has_no_maps_and_is_a_line(tmp_path):
     text = CASE.replace("sphere", "cylinder").replace(" N,", " N/mm,").replace(" N}", " N/mm}")
     case = parse_case(text.replace("[100, 90], size: [1 mm, 0.9 mm]", "64, size: 1 mm"), "c.yaml")
-    grid = Grid.strips(1.0, 64)
+    grid = Grid.line_contact(1.0, 64)
     pressure = np.maximum(0.0, 0.1 - grid.x**2)
     states = [state((pressure * k, 0 * pressure), [1.0, k, 0, 0, 0, 0], [0, k, 0, 0, 0, 0.0],
                     grid=grid, pressure=pressure) for k in (0.0, 0.5, -0.5)]  # fmt: skip
@@ -308,16 +308,16 @@ def test_line_has_no_maps_and_is_a_line(tmp_path):
     folder = OutputFolder(tmp_path / "out")
     folder.claim(case, force=False, resumable=False)
     write_contact_results(outcome, SimpleNamespace(kind="line", folder=folder))
-    told = ANALYSIS.pictures, ContactContents(line=True, increments=len(states)), folder.results
+    reported = ANALYSIS.pictures, ContactContents(line=True, increments=len(states)), folder.results
     shown = folder.root / "paraview"
-    write_paraview(*told, shown)
+    write_paraview(*reported, shown)
     line = pv.PVDReader(shown / "contact.pvd").read()[0]
     assert (line.n_lines, line.n_points) == (1, 64)
     np.testing.assert_allclose(line.points[:, 0], grid.x.ravel())
     assert line.length == pytest.approx(1.0 - 1.0 / 64)
     check_arrays(shown)
     assert len(check_scene(shown / "view.py")["views"]) == 3
-    written = write_figures(*told, folder.root / "figures")
+    written = write_figures(*reported, folder.root / "figures")
     assert {path.stem for path in written} == {"profiles", "forces"}
     with h5py.File(folder.results) as file:
         assert file.attrs["kind"] == "line"

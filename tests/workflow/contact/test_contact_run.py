@@ -225,7 +225,9 @@ def test_small_grid_is_warned_of(whole, small, tmp_path):
         *("--set", "contact.size=[0.6 mm, 0.6 mm]", "--set", "load_path.legs=[{P: 400 N}]"),
     )
     assert done.exit_code == 0, done.stderr
-    assert any("touches the border" in told for told in summary_of(tmp_path / "out")["warnings"])
+    assert any(
+        "touches the border" in reported for reported in summary_of(tmp_path / "out")["warnings"]
+    )
 
 
 def test_force_that_no_friction_can_carry_is_told_in_a_line(whole, small, tmp_path):

@@ -94,8 +94,8 @@ def limit_of_sphere(d: float, c: float) -> dict[str, float]:
 def assert_told(found: dict, exact: dict[str, float], most: float = 3.0) -> None:
     for name, true in exact.items():
         error = sum(found[f"{name}_{body}"] for body in (1, 2)) / true - 1.0
-        told = found["error"][name]["grid"]
-        assert 1.0 / most < told / error < most, (name, error, told)
+        reported = found["error"][name]["grid"]
+        assert 1.0 / most < reported / error < most, (name, error, reported)
 
 
 def test_a_punch_of_cells_is_narrower_than_these() -> None:

@@ -14,7 +14,7 @@ from workflow.case.sections import files_of
 from workflow.errors import UserError
 from workflow.kinds import load_case
 from workflow.runs.provenance import provenance_of
-from workflow.runs.run import bring_to_end, kept_in, resume_run
+from workflow.runs.run import bring_to_end, resume_run, stored_run
 from workflow.shell.folders import cache
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
@@ -199,9 +199,9 @@ DAMAGES = [
 @pytest.mark.parametrize(("damage", "wrong"), DAMAGES)
 def test_finished_run_that_was_changed_is_computed_again(left, finished, damage, wrong):
     out, case = left
-    assert kept_in(out, case) == "finished"
+    assert stored_run(out, case) == "finished"
     damage(out)
-    assert kept_in(out, case) == "nothing"
+    assert stored_run(out, case) == "nothing"
     with pytest.raises(UserError, match=wrong) as refusal:
         resume_run(out)
     assert "\n" not in str(refusal.value)
@@ -219,21 +219,21 @@ def test_finished_run_of_other_files_is_computed_again(finished, left):
     before = loads.read_bytes()
     try:
         swap(loads, b"400, 150, 0, 3\n", b"400, 150, 0, 4\n")
-        assert kept_in(out, case) == "nothing"
+        assert stored_run(out, case) == "nothing"
         with pytest.raises(UserError, match=r"loads\.csv: differs from the run"):
             resume_run(out)
     finally:
         loads.write_bytes(before)
-    assert kept_in(out, case) == "finished"
+    assert stored_run(out, case) == "finished"
 
 
 def test_finished_run_whose_case_was_changed_is_not_its_run(left, finished):
     """The run does not belong to the changed case, and that case is not finished either."""
     out, case = left
     swap(out / "case.yaml", b"coefficient: 0.4 ", b"coefficient: 0.6 ")
-    assert kept_in(out, case) == "other"
+    assert stored_run(out, case) == "other"
     other = load_case(finished / "wear.yaml", ("friction.coefficient=0.6",))
-    assert kept_in(out, other) == "nothing"
+    assert stored_run(out, other) == "nothing"
     with pytest.raises(UserError, match=r"case\.yaml: differs from the run"):
         resume_run(out)
 
@@ -241,7 +241,7 @@ def test_finished_run_whose_case_was_changed_is_not_its_run(left, finished):
 def test_case_that_is_no_text_is_of_another_run(left):
     out, case = left
     (out / "case.yaml").write_bytes(b"\xff\xfe")
-    assert kept_in(out, case) == "other"
+    assert stored_run(out, case) == "other"
     with pytest.raises(UserError, match=r"case\.yaml"):
         resume_run(out)
 

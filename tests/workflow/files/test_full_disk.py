@@ -54,20 +54,20 @@ def ball(tmp_path):
 @pytest.fixture
 def synced(monkeypatch):
     """Record the order in which files are flushed to disk and renamed."""
-    told = []
+    reported = []
     fsync, rename = os.fsync, Path.replace
 
     def syncing(file):
-        told.append(("synced", Path(f"/proc/self/fd/{file}").readlink().name))
+        reported.append(("synced", Path(f"/proc/self/fd/{file}").readlink().name))
         fsync(file)
 
     def renaming(path, target):
-        told.append(("renamed", path.name))
+        reported.append(("renamed", path.name))
         return rename(path, target)
 
     monkeypatch.setattr(os, "fsync", syncing)
     monkeypatch.setattr(Path, "replace", renaming)
-    return told
+    return reported
 
 
 # --- what writes files ----------------------------------------------------------------------------
@@ -185,11 +185,11 @@ def test_a_limit_of_the_system_ends_a_run_in_one_line(size, ball, tmp_path):
     out = tmp_path / "out"
     ending = command("run", ball, "--out", out, code=LIMITED.format(size))
     assert ending.returncode == 3, ending.stderr
-    *said, line = [line for line in ending.stderr.splitlines() if line]
+    *printed, line = [line for line in ending.stderr.splitlines() if line]
     assert line.startswith(f"fretscale: {out}/")
     assert "File too large" in line
     assert "continue with the same command" in line
-    assert said == (["run: Ball"] if size else [])
+    assert printed == (["run: Ball"] if size else [])
     assert not list(tmp_path.rglob(".*"))
 
 

@@ -24,7 +24,7 @@ ageing: {cycles: 1000}
 """
 
 
-def told(path, *overrides):
+def reported(path, *overrides):
     """Return the only line of a case that is refused."""
     ended = command("check", path, overrides=overrides)
     assert ended.exit_code == 2, ended.output
@@ -61,7 +61,7 @@ def test_no_case_names_one_that_names_it(tmp_path, way):
         (tmp_path / "b.yaml").write_text(TIME % "a.yaml", encoding="utf-8")
     wrong = "no case of wear" if way == "another" else "the case itself, or one that names it"
     start = f"fretscale: {path}:5: evolution.file: '{named}': {wrong}"
-    assert told(path).startswith(start)
+    assert reported(path).startswith(start)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_case_that_is_named_is_one_of_the_kind(tmp_path, text, words):
     (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     (tmp_path / "w.yaml").write_text(text, encoding="utf-8")
     (tmp_path / "a.yaml").write_text(TIME % "w.yaml", encoding="utf-8")
-    line = told(tmp_path / "a.yaml")
+    line = reported(tmp_path / "a.yaml")
     assert line.startswith(f"fretscale: {tmp_path / 'a.yaml'}:5: evolution.file: 'w.yaml': ")
     assert words in line
 
@@ -115,7 +115,7 @@ def test_all_that_an_hdf5_file_leads_to_is_in_it(tmp_path, spoil, words):
     text = (CASES / "sphere_normal.yaml").read_text(encoding="utf-8")
     path, structure = tmp_path / "case.yaml", "structure={kind: bodies, shape: heights, file: %s}"
     path.write_text(text, encoding="utf-8")
-    line = told(path, structure % '"a.h5:gap"')
+    line = reported(path, structure % '"a.h5:gap"')
     assert f"structure.file: {tmp_path / 'a.h5'}: {words}" in line
     with pytest.raises(InputFileError, match=words), open_hdf5(str(tmp_path / "a.h5")):
         pass
@@ -139,7 +139,7 @@ def test_what_is_no_field_of_heights_is_one_line(tmp_path, spoil, name):
     text = (CASES / "sphere_normal.yaml").read_text(encoding="utf-8")
     (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
     structure = f'structure={{kind: bodies, shape: heights, file: "{name}"}}'
-    assert "cannot be read (" in told(tmp_path / "case.yaml", structure)
+    assert "cannot be read (" in reported(tmp_path / "case.yaml", structure)
 
 
 @pytest.mark.parametrize(

@@ -121,8 +121,8 @@ def test_how_well_a_cycle_is_closed_is_told_and_read_back(tmp_path):
     write_resultants_h5(fields, {"f": history}, cycle=cycle)
     for path in (table, fields):
         assert read_resultants(path)["f"].closure == 3.5e-3
-    told = table.read_text().splitlines()[0]
-    assert told.endswith(
+    reported = table.read_text().splitlines()[0]
+    assert reported.endswith(
         "the last of 13 cycles marched from rest; the contact forces differ from the cycle "
         "before by 3.5e-03 of the largest"
     )

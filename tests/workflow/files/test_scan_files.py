@@ -200,8 +200,8 @@ def test_points_that_only_a_probe_of_atoms_resolves_are_a_doubt(tmp_path):
     surfaces = MeasuredSurfaces.model_validate(
         {"body_1": {"file": "near.x3p"}}, context={"folder": str(tmp_path)}
     )
-    (doubt,) = surfaces.doubts(Grid.covering((2e-5, 2e-5), (4, 4)))
-    assert "points 5 nm apart: is their unit right?" in doubt
+    (warning,) = surfaces.plausibility_warnings(Grid.covering((2e-5, 2e-5), (4, 4)))
+    assert "points 5 nm apart: is their unit right?" in warning
 
 
 def test_a_gap_from_files_is_the_same_as_one_that_is_made(both):
@@ -219,14 +219,14 @@ def test_a_gap_from_files_is_the_same_as_one_that_is_made(both):
 def test_cases_tell_what_they_take_of_a_scan(both):
     folder, grid, *_ = both
     case = rough_ball(folder, "{body_1: {file: 1.x3p, shift: [1 um, 0], beyond: mirrored}}")
-    told = dict(case.outline())["surface 1"]
-    assert told.startswith("16 x 16 points 62.5 µm apart, 99.4 nm rms, ")
+    reported = dict(case.outline())["surface 1"]
+    assert reported.startswith("16 x 16 points 62.5 µm apart, 99.4 nm rms, ")
     numbers = case.structure.surfaces.summary(grid)["body_1"]
     assert numbers["missing"] == 0.0
     assert 0.0 < numbers["lost"] < 0.1 * numbers["rms"]
     coarse = Grid.covering((1.0, 1.0), (4, 4))
-    (doubt,) = case.structure.surfaces.doubts(coarse)
-    assert "is finer than the cells" in doubt
+    (warning,) = case.structure.surfaces.plausibility_warnings(coarse)
+    assert "is finer than the cells" in warning
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from tests.workflow.command_line import command, runs_here
 from tests.workflow.scenes import ROLLER_LOADS, ROLLER_WEAR
 from workflow.errors import UserError
 from workflow.kinds import load_case
-from workflow.runs.run import kept_in, run_case
+from workflow.runs.run import run_case, stored_run
 from workflow.shell.folders import cache, store
 from workflow.shell.folders.lock import LOCK, locked
 
@@ -91,7 +91,7 @@ def test_in_a_finished_run(run, put, name):
     assert ended.exit_code == 2
     (line,) = ended.stderr.splitlines()
     assert f"{run / name}: not a file: a pipe or a device" in line
-    assert kept_in(run, load_case(run / "case.yaml")) == "nothing"
+    assert stored_run(run, load_case(run / "case.yaml")) == "nothing"
 
 
 def test_in_the_place_of_the_log(run, put):

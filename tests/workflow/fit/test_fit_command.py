@@ -94,8 +94,8 @@ def test_friction_is_of_loops_that_slide(folder):
     (folder / "loops.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
     found = fretscale.fit(folder / "joint.yaml")
     assert found["joint.friction"].value == pytest.approx(0.11, rel=1e-6)
-    (doubt,) = (doubt for doubt in found.doubts if doubt.startswith("mu: "))
-    assert doubt == "mu: not used where loops do not slide as a whole (loops.csv:7)"
+    (caveat,) = (caveat for caveat in found.plausibility_warnings if caveat.startswith("mu: "))
+    assert caveat == "mu: not used where loops do not slide as a whole (loops.csv:7)"
     text = "\n".join([lines[0], *(line.rpartition(",")[0] + ", 0.5" for line in lines[1:]), ""])
     (folder / "loops.csv").write_text(text, encoding="utf-8")
     refused = invoke("fit", folder / "joint.yaml")
@@ -136,7 +136,7 @@ def test_what_is_not_determined_stands_without_a_number(folder):
     found = fretscale.fit(folder / "joint.yaml")
     friction = found["joint.friction"]
     assert (friction.value, friction.lower) == (None, None)
-    assert "only together with evolution.friction.change" in friction.doubt
+    assert "only together with evolution.friction.change" in friction.caveat
     assert "# friction: undetermined" in found.section
     # With the initial value held the rest is found.
     held = JOINT.replace("{normal_load: 60 N}", "{normal_load: 60 N, friction: 0.11}")
@@ -165,8 +165,10 @@ def test_a_law_comes_back_from_a_record_of_loops(folder):
     # Of load and friction only the product counts, and no number is given for either.
     asked["joint"]["normal_load"] = "free"
     found = fretscale.fit(asked)
-    assert found["joint.friction"].doubt == "only its product with joint.normal_load counts"
-    (product,) = [doubt for doubt in found.doubts if " times joint.normal_load is " in doubt]
+    assert found["joint.friction"].caveat == "only its product with joint.normal_load counts"
+    (product,) = [
+        caveat for caveat in found.plausibility_warnings if " times joint.normal_load is " in caveat
+    ]
     assert float(product.partition(" is ")[2].split()[0]) == pytest.approx(54.0, rel=1e-4)
     assert found["joint.stiffness"].value == pytest.approx(60.0, rel=1e-3)
     del asked["joint"]["normal_load"]
@@ -189,7 +191,7 @@ def test_a_joint_that_wears_within_a_record_is_told(folder):
             "joint": {"law": "uniform_iwan", "normal_load": "60 N"},
         }
     )
-    assert any("loops of one stroke change" in doubt for doubt in found.doubts)
+    assert any("loops of one stroke change" in caveat for caveat in found.plausibility_warnings)
     assert "closed loops of" in str(found)
 
 
@@ -247,9 +249,13 @@ def test_files_of_two_materials_are_told(folder):
             "wear": {"law": "energy"},
         }
     )
-    assert any("two groups" in doubt and "b.csv:2" in doubt for doubt in found.doubts)
-    assert any("files lie apart" in doubt for doubt in found.doubts)
-    (apart,) = [doubt for doubt in found.doubts if "contradict each other" in doubt]
+    assert any(
+        "two groups" in caveat and "b.csv:2" in caveat for caveat in found.plausibility_warnings
+    )
+    assert any("files lie apart" in caveat for caveat in found.plausibility_warnings)
+    (apart,) = [
+        caveat for caveat in found.plausibility_warnings if "contradict each other" in caveat
+    ]
     assert apart.startswith("wear.both.coefficient: ")
     tests = found.summary["tests"]["wear.both.coefficient"]
     assert [one["file"] for one in tests["files"]] == ["a.csv", "b.csv"]

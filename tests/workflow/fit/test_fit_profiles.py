@@ -97,8 +97,10 @@ def test_coefficients_of_both_bodies_come_back_through_closed_forms(folder, monk
         errors = found.summary["runs"]["relative_errors"][path]
         assert abs(errors["for_want_of_runs"]) < 0.1 * found[path].deviation / true
         assert errors["by_finer"] == pytest.approx(-0.03, rel=0.1)
-        assert any(d.startswith(f"{path}: finer runs change it by") for d in found.doubts)
-    assert "the runs: it is a closed form" in found.doubts
+        assert any(
+            d.startswith(f"{path}: finer runs change it by") for d in found.plausibility_warnings
+        )
+    assert "the runs: it is a closed form" in found.plausibility_warnings
     assert found.summary["runs"]["made"] <= 5
     section = YAML(typ="safe", pure=True).load(found.section)["wear"]
     assert list(section) == ["law", "body_1", "body_2"]
@@ -152,7 +154,10 @@ def test_a_coefficient_comes_back_through_runs_which_are_taken_up(folder):
     assert found[path].deviation < 100.0
     errors = found.summary["runs"]["relative_errors"][path]
     assert abs(errors["by_finer"]) < 2e-3
-    assert all(doubt.startswith("the runs: interface is 12 cells") for doubt in found.doubts)
+    assert all(
+        caveat.startswith("the runs: interface is 12 cells")
+        for caveat in found.plausibility_warnings
+    )
     assert found["profile.shift"].lower < 50.0 < found["profile.shift"].upper
     section = YAML(typ="safe", pure=True).load(found.section)["wear"]
     assert section["body_2"] == {"coefficient": "3000 um^3/J"}

@@ -129,8 +129,8 @@ def test_a_program_needs_no_guard(how, tmp_path):
 )
 def test_terminals_without_some_letters_have_them_spelled(encoding, shown):
     code = (
-        "from workflow.shell.terminal.streams import spell_what_streams_lack;"
-        "spell_what_streams_lack();"
+        "from workflow.shell.terminal.streams import replace_missing_characters;"
+        "replace_missing_characters();"
         "print('stroke 36 µm, −3 m² ± 1 %, 10⁻⁷ → 中')"
     )
     environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
@@ -199,7 +199,7 @@ def test_ctrl_c_ends_a_script_by_its_exception(tmp_path):
             assert time.monotonic() < end
             time.sleep(0.05)
         script.send_signal(signal.SIGINT)
-        told = script.stderr.read().decode()
-    assert told.splitlines()[-1].startswith("KeyboardInterrupt")
+        reported = script.stderr.read().decode()
+    assert reported.splitlines()[-1].startswith("KeyboardInterrupt")
     with pytest.raises(fretscale.UserError, match="not finished; continue with `fretscale res"):
         fretscale.open(tmp_path / "out")

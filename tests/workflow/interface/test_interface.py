@@ -86,7 +86,7 @@ def test_a_wrong_override_is_told_as_on_the_command_line(name, value, dovetail_p
 
 
 @pytest.mark.parametrize(
-    ("case", "told"),
+    ("case", "reported"),
     [
         ({}, "the case: analysis: missing; allowed: wear, "),
         (None, "the case: of type NoneType; allowed: the path of a file, a dictionary, a case"),
@@ -98,10 +98,10 @@ def test_a_wrong_override_is_told_as_on_the_command_line(name, value, dovetail_p
         ("no.yaml", "no.yaml: no such file"),
     ],
 )
-def test_a_wrong_case_is_one_line(case, told):
+def test_a_wrong_case_is_one_line(case, reported):
     with pytest.raises(fretscale.CaseError) as error:
         fretscale.load_case(case)
-    assert str(error.value).startswith(told)
+    assert str(error.value).startswith(reported)
     assert "\n" not in str(error.value)
 
 
@@ -120,9 +120,9 @@ def test_a_check_says_what_the_command_says(monkeypatch):
     assert "64 x 64 cells" in dict(checked.outline)["contact"]
     assert "64 x 64 cells" in str(checked)
     assert checked.memory > 1e9
-    doubted = fretscale.check(SPHERE, materials__body_1__young="210 MPa")
-    assert "210 MPa" in doubted.doubts[0]
-    assert f"warning: {doubted.doubts[0]}" in str(doubted)
+    implausible = fretscale.check(SPHERE, materials__body_1__young="210 MPa")
+    assert "210 MPa" in implausible.plausibility_warnings[0]
+    assert f"warning: {implausible.plausibility_warnings[0]}" in str(implausible)
     monkeypatch.setattr("workflow.shell.memory._available_bytes", lambda: 1e9)
     with pytest.raises(fretscale.OutOfMemory, match=r"1\.0 GB are free"):
         fretscale.check(SPHERE)

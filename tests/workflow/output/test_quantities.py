@@ -14,7 +14,7 @@ from tests.workflow.rig.test_friction_rig import SPECIMENS
 from tests.workflow.scenes import BALL, RIG_OF_THESIS, ROLLER_LOADS, ROLLER_WEAR
 from tests.workflow.shell.test_kills import PADS_THAT_WEAR
 from tests.workflow.vibration.time_scenes import JOINT
-from workflow.analyses.wear.output.quantities import _left_by_mesh, _load_ranges
+from workflow.analyses.wear.output.quantities import _load_ranges, _mesh_error
 from workflow.analyses.wear.worn.worn_structure import load_ranges
 from workflow.case.sections import words_of
 from workflow.case.units import to_base
@@ -122,5 +122,5 @@ def test_loads_tell_their_ends_and_increments():
 
 def test_a_stress_without_bound_has_no_error():
     place = {"von_mises": 300.0, "error": 1.0}
-    assert _left_by_mesh({"at": place}, "at") == {"where": "grows as the mesh is refined"}
-    assert _left_by_mesh({"at": {**place, "error": 0.2}}, "at")["error"] == 0.2
+    assert _mesh_error({"at": place}, "at") == {"where": "grows as the mesh is refined"}
+    assert _mesh_error({"at": {**place, "error": 0.2}}, "at")["error"] == 0.2

@@ -52,7 +52,7 @@ class Page(HTMLParser):
     def __init__(self, text: str) -> None:
         super().__init__()
         self.open: list[str] = []
-        self.told: dict[str, str] = {}
+        self.reported: dict[str, str] = {}
         self.links: list[str] = []
         self.images: list[str] = []
         self.tags: set[str] = set()
@@ -76,7 +76,7 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if self.open and self.open[-1] in ("h1", "h2"):
             self._heading = data
-        self.told[self._heading] = self.told.get(self._heading, "") + data
+        self.reported[self._heading] = self.reported.get(self._heading, "") + data
 
 
 def run(folder: Path, *overrides: str) -> Path:
@@ -100,24 +100,24 @@ def test_page_tells_all_of_a_run_and_needs_nothing_else(drawn):
     text = (drawn / "report.html").read_text("utf-8")
     page = Page(text)
     assert manifest_has_all(drawn)
-    assert page.told[TITLE]
+    assert page.reported[TITLE]
     assert "script" not in page.tags
     assert all(link.startswith("#") for link in page.links)
     assert all(image.startswith("data:image/svg+xml;base64,") for image in page.images)
     assert not re.search(r"https?://|url\(|@import", re.sub(r"base64,[^\"]*", "", text))
-    assert "1441 MPa" in page.told["Results"].replace("\N{NO-BREAK SPACE}", " ")
-    expected = page.told["Expectations"]
+    assert "1441 MPa" in page.reported["Results"].replace("\N{NO-BREAK SPACE}", " ")
+    expected = page.reported["Expectations"]
     assert ("met" in expected, "missed" in expected, "7 is missing" in expected) == (True,) * 3
     assert "given <b>" in expected
-    assert "1 of 3 expectations met" in page.told[TITLE]
-    assert "115 GPa" in page.told["The case"]
-    assert "friction" in page.told["The case"]
-    assert (drawn / "case.yaml").read_text("utf-8") in page.told["The case file"]
-    assert "numpy" in page.told["Methods"]
+    assert "1 of 3 expectations met" in page.reported[TITLE]
+    assert "115 GPa" in page.reported["The case"]
+    assert "friction" in page.reported["The case"]
+    assert (drawn / "case.yaml").read_text("utf-8") in page.reported["The case file"]
+    assert "numpy" in page.reported["Methods"]
     seconds = json.loads((drawn / "summary.json").read_text("utf-8"))["seconds"]
-    told = [name for name in seconds if name in page.told["Time"]]
-    assert told == [name for name, spent in seconds.items() if spent >= AT_ONCE]
-    assert f"all{sum(seconds.values()):,.1f} s" in page.told["Time"]
+    reported = [name for name in seconds if name in page.reported["Time"]]
+    assert reported == [name for name, spent in seconds.items() if spent >= AT_ONCE]
+    assert f"all{sum(seconds.values()):,.1f} s" in page.reported["Time"]
 
 
 def test_figures_are_of_the_formats_asked_for_and_those_of_the_page(drawn):
@@ -132,8 +132,8 @@ def test_figures_are_of_the_formats_asked_for_and_those_of_the_page(drawn):
 
 def test_figures_are_the_same_bytes_for_the_same_results(drawn, tmp_path):
     contents = read_contents(drawn / "results.h5", ContactContents)
-    told = contact.ANALYSIS.pictures, contents, drawn / "results.h5", tmp_path
-    (path,) = write_figures(*told, ["profiles"], formats=("pdf",))
+    reported = contact.ANALYSIS.pictures, contents, drawn / "results.h5", tmp_path
+    (path,) = write_figures(*reported, ["profiles"], formats=("pdf",))
     assert path.read_bytes() == (drawn / "figures" / path.name).read_bytes()
 
 
@@ -150,7 +150,7 @@ def test_a_run_that_draws_or_reports_nothing(tmp_path):
     out = run(tmp_path / "plain", *QUIET)
     page = Page((out / "report.html").read_text("utf-8"))
     assert page.images == []
-    assert "drew no figures" in page.told["Figures"]
+    assert "drew no figures" in page.reported["Figures"]
     out = run(tmp_path / "silent", *QUIET, "output.report=false")
     assert not (out / "report.html").exists()
     elsewhere = tmp_path / "deep" / "page.html"
@@ -160,7 +160,7 @@ def test_a_run_that_draws_or_reports_nothing(tmp_path):
 
 
 def test_a_page_that_fails_does_not_lose_the_run(tmp_path, monkeypatch):
-    def fail(*told):
+    def fail(*reported):
         raise KeyError("number")
 
     monkeypatch.setattr(running, "write_page", fail)
@@ -274,18 +274,18 @@ def test_long_numbers_are_grouped_and_names_of_files_are_not():
 
 
 def test_expectations_are_named_by_the_results_they_are_of(drawn):
-    told = Page((drawn / "report.html").read_text("utf-8")).told["Expectations"]
-    assert "after the last increment: largest pressure" in told
+    reported = Page((drawn / "report.html").read_text("utf-8")).reported["Expectations"]
+    assert "after the last increment: largest pressure" in reported
     assert counted_from_first({"a": [{"b": 1}, {"b": 2}]}, "a.-1.b") == "a.1.b"
     assert counted_from_first({"a": [1]}, "a.-3.b") == "a.-3.b"
 
 
 def test_warnings_that_places_share_are_told_once():
     shared = [f"the half-space under {force} N: too coarse by -1 um" for force in (17, 87)]
-    told = _warnings([*shared, "left: worn through", "nothing: of many words: here"])
-    assert told.count("too coarse by −1 µm") == 1
-    assert "the half-space under 17 N; the half-space under 87 N" in told
-    assert "<strong>left</strong>: worn through" in told
+    reported = _warnings([*shared, "left: worn through", "nothing: of many words: here"])
+    assert reported.count("too coarse by −1 µm") == 1
+    assert "the half-space under 17 N; the half-space under 87 N" in reported
+    assert "<strong>left</strong>: worn through" in reported
 
 
 def test_an_axis_is_not_filled_by_noise():

@@ -105,7 +105,7 @@ def test_three_points_of_a_square_are_a_triangle(missing: tuple[int, int]) -> No
 
 
 def test_a_line_is_interrupted_where_the_face_is() -> None:
-    grid = Grid.strips(10.0, 10)
+    grid = Grid.line_contact(10.0, 10)
     segments = np.array([[0, 1], [2, 3]])
     ends = np.array([[-5.0, 0.0], [-2.0, 0.0], [1.0, 0.0], [5.0, 0.0]])
     inside = FaceTransfer.between(Face("", FLAT, ends, segments), grid).inside

@@ -30,10 +30,10 @@ def screen() -> Iterator[str]:
     Without `-noreset` the server restarts when its last window closes, and refuses connections
     meanwhile: ParaView opens a test window before its own.
     """
-    told, tells = os.pipe()
+    reported, tells = os.pipe()
     command = ["Xvfb", "-displayfd", str(tells), "-noreset", "-nolisten", "tcp"]
     with (
-        os.fdopen(told, encoding="ascii") as number,
+        os.fdopen(reported, encoding="ascii") as number,
         subprocess.Popen(command, pass_fds=[tells], stderr=subprocess.DEVNULL) as server,
     ):
         os.close(tells)

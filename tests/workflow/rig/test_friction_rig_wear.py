@@ -245,7 +245,7 @@ def test_nothing_is_lost_below_a_threshold(pads, unworn):
 def test_nothing_wears_where_nothing_slips(pads):
     still = with_laws(pads, force=STUCK_FORCE)
     done = worn(still, still.begin(), 1e6, 0.1)
-    assert done.spent.steps == 2
+    assert done.cost.steps == 2
     assert done.state.energy == 0.0
     assert not done.state.surfaces.depth.any()
 
@@ -302,9 +302,9 @@ def test_the_tolerance_bounds_the_error(pads, unworn):
         done = worn(pads, unworn, 2e5, tolerance)
         error = np.linalg.norm(done.state.surfaces.depth - exact) / np.linalg.norm(exact)
         assert error < 0.2 * tolerance
-        told = step_errors(done.state, pads.at(done.state).areas)["depth"]
-        assert error / 3.0 < told < 3.0 * error
-        assert done.spent.steps < best.spent.steps
+        reported = step_errors(done.state, pads.at(done.state).areas)["depth"]
+        assert error / 3.0 < reported < 3.0 * error
+        assert done.cost.steps < best.cost.steps
 
 
 @pytest.mark.slow
@@ -426,8 +426,8 @@ def test_figures_are_drawn(ended, tmp_path):
     from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents
     from workflow.pictures.drawing import write_figures
 
-    told = ANALYSIS.pictures, VibrationWearContents(at_nodes=True), ended.results
-    drawn = {path.stem for path in write_figures(*told, tmp_path)}
+    reported = ANALYSIS.pictures, VibrationWearContents(at_nodes=True), ended.results
+    drawn = {path.stem for path in write_figures(*reported, tmp_path)}
     assert drawn == {"frequency_response", "evolution", "profile", "loops"}
 
 

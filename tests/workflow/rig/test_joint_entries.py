@@ -252,9 +252,9 @@ def test_a_mass_beside_a_body_is_held_by_joints_and_springs(body):
         stiff += spring * np.outer(row, row)
     # The stop is open at rest.
     held = np.sqrt(sl.eigh(stiff, mass, eigvals_only=True)) / (2.0 * np.pi)
-    told = structure_numbers(model)
-    np.testing.assert_allclose(told["free"], apart, rtol=1e-10)
-    np.testing.assert_allclose(told["stuck"], held, rtol=1e-10)
+    reported = structure_numbers(model)
+    np.testing.assert_allclose(reported["free"], apart, rtol=1e-10)
+    np.testing.assert_allclose(reported["stuck"], held, rtol=1e-10)
     assert model.problem.solve(90.0, 10.0).converged
 
 
@@ -356,7 +356,7 @@ def test_a_row_has_the_joint_of_the_case_behind_its_last_mass(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "key", "said"),
+    ("overrides", "key", "printed"),
     [
         (["structure.joints=[]"], "joint", "the law of all joints"),
         (["structure.joints.0.joint=null"], "joint", "or one for each entry"),
@@ -368,15 +368,15 @@ def test_a_row_has_the_joint_of_the_case_behind_its_last_mass(tmp_path):
         (["loops={frequency: 90 Hz, joints: 3}"], "loops.joints", "no such entry"),
     ],
 )
-def test_nonsense_in_a_row_is_refused(tmp_path, overrides, key, said):
+def test_nonsense_in_a_row_is_refused(tmp_path, overrides, key, printed):
     with pytest.raises(UserError) as refused:
         parse_case(CASE, str(tmp_path / "case.yaml"), overrides)
     assert key in str(refused.value)
-    assert said in str(refused.value)
+    assert printed in str(refused.value)
 
 
 @pytest.mark.parametrize(
-    ("overrides", "said"),
+    ("overrides", "printed"),
     [
         (["structure.further_masses.0.name=block"], "further_masses.0.name=block: 'block': a"),
         (["structure.further_masses.0.directions=x"], "damper does not move along y; allowed: x"),
@@ -385,10 +385,10 @@ def test_nonsense_in_a_row_is_refused(tmp_path, overrides, key, said):
         (["structure.joints.0.points=dumper"], "structure.joints.0.points=dumper: 'dumper': no"),
     ],
 )
-def test_nonsense_beside_a_body_is_refused(body, overrides, said):
+def test_nonsense_beside_a_body_is_refused(body, overrides, printed):
     with pytest.raises(UserError) as refused:
         model_of(body, ON_BODY, *overrides)
-    assert said in str(refused.value)
+    assert printed in str(refused.value)
 
 
 def test_a_contact_that_wears_is_alone():

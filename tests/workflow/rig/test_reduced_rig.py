@@ -250,13 +250,13 @@ def test_energies_balance_while_the_contact_slides_and_lifts_off(specimen, direc
     brought = np.abs(np.diff(energies.excitation)).sum()
     assert np.abs(energies.missing).max() < ROUNDING * brought
     assert np.diff(energies.joints, axis=0).min() >= 0.0
-    told = rig.contact(motion)
-    assert told["largest_normal_force"] > LOAD > told["smallest_normal_force"]
+    reported = rig.contact(motion)
+    assert reported["largest_normal_force"] > LOAD > reported["smallest_normal_force"]
     if direction == "x":
         assert energies.joints[-1].sum() > 0.01 * brought
     else:
-        assert told["most_open"] == PAD
-        assert told["smallest_normal_force"] == 0.0
+        assert reported["most_open"] == PAD
+        assert reported["smallest_normal_force"] == 0.0
     # Coulomb's cone, at every point and time.
     force = motion.joint_force
     assert np.all(np.hypot(*force[:, :, :2].T) <= 0.5 * force[:, :, 2].T + ROUNDING * LOAD)

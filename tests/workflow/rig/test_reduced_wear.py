@@ -18,7 +18,7 @@ from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from fe_models.joints.reduction import save_reduced
-from fe_models.matrices import on_all, own_matrices
+from fe_models.matrices import external_matrices, on_all
 from tests.workflow.conftest import invoke
 from tests.workflow.output.shown_files import check_arrays, check_scene, total
 from tests.workflow.vibration.time_scenes import refused
@@ -238,8 +238,8 @@ def test_a_point_that_a_spring_presses_wears_as_its_equation_says(point):
         for _ in range(count):
             state = stepper.step(state, CYCLES / count, CYCLES, point.contact_at).state
         errors.append(state.surfaces.depth[0] / exact - 1.0)
-        told = step_errors(state, point.at(state).areas)["depth"]
-        assert abs(errors[-1]) / 2.0 < told < 2.0 * abs(errors[-1])
+        reported = step_errors(state, point.at(state).areas)["depth"]
+        assert abs(errors[-1]) / 2.0 < reported < 2.0 * abs(errors[-1])
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert np.all((orders > 1.7) & (orders < 2.5)), orders
     cycle = point.at(state)
@@ -262,7 +262,7 @@ def test_volume_energy_and_work_balance(pads):
     assert begun.model.touching.sum() < cycle.model.touching.sum() <= NODES
     left = []
     for samples in (64, 128, 256):
-        problem = cycle.model.problem.refined(Resolution((0, 1, 3, 5), samples))
+        problem = cycle.model.problem.with_resolution(Resolution((0, 1, 3, 5), samples))
         motion = problem.solve(300.0, 60.0, cycle.motion)
         left.append(abs(work_done(problem, motion) / energy_lost(problem, motion) - 1.0))
     assert left[0] < 1e-2
@@ -291,7 +291,7 @@ def test_a_load_on_the_contacts_is_that_on_what_presses_them(folder, tmp_path):
 
 def test_a_stored_reduced_body_wears_as_its_matrices(pads, folder):
     """The other kind of structure has its places in its file."""
-    save_reduced(folder / "body.h5", on_all(own_matrices({}, folder / "body.npz")))
+    save_reduced(folder / "body.h5", on_all(external_matrices({}, folder / "body.npz")))
     own = case_of(folder)
     kept = ("joints", "damping_ratio", "driven", "seen")
     entries = own.structure.model_dump(include=set(kept), exclude_none=True)
@@ -411,7 +411,7 @@ def test_a_run_leaves_nodes_in_tables_results_and_paraview(ended):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "said"),
+    ("overrides", "printed"),
     [
         (["joint.nodes="], "joint.area: missing; allowed: area of all contacts together"),
         (["joint.area=1 mm^2"], "given beside areas in"),
@@ -424,14 +424,14 @@ def test_a_run_leaves_nodes_in_tables_results_and_paraview(ended):
         (["joint.area=0", "joint.nodes="], "joint.area"),
     ],
 )
-def test_nonsense_is_refused(folder, overrides, said):
+def test_nonsense_is_refused(folder, overrides, printed):
     code, message = refused(folder, BODY, *overrides)
     assert (code, "allowed" in message) == (2, True)
-    assert said in message
+    assert printed in message
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "said"),
+    ("before", "after", "printed"),
     [
         ("pad 9,", "pad 8,", "nodes.csv:10: point: pad 8: given twice; allowed: every point once"),
         ("pad 9,", "pad 10,", "nodes.csv:10: point: pad 10: no joint"),
@@ -440,11 +440,11 @@ def test_nonsense_is_refused(folder, overrides, said):
         ("pad 1,0.0625", "pad 1,0", "out of range"),
     ],
 )
-def test_files_of_nodes_are_refused(tmp_path, before, after, said):
+def test_files_of_nodes_are_refused(tmp_path, before, after, printed):
     write_body(tmp_path)
     assert before in NODES_FILE
     (tmp_path / "nodes.csv").write_text(NODES_FILE.replace(before, after), encoding="utf-8")
     (tmp_path / "case.yaml").write_text(BODY, encoding="utf-8")
     done = invoke("run", tmp_path / "case.yaml", "--out", tmp_path / "out")
     assert done.exit_code == 2
-    assert said in " ".join(done.stderr.split())
+    assert printed in " ".join(done.stderr.split())

@@ -95,13 +95,13 @@ def test_dashpots_damp_in_time(tmp_path):
     ],
 )
 def test_nonsense_is_refused_with_its_place(tmp_path, entry, message):
-    code, told = refused(tmp_path, RIG, f"structure.{entry}")
+    code, reported = refused(tmp_path, RIG, f"structure.{entry}")
     assert code == 2
-    assert message in told
+    assert message in reported
 
 
 def test_a_loss_factor_is_refused_in_time(tmp_path):
-    code, told = refused(tmp_path, RIG_IN_TIME, "structure.damping.loss_factor=4 %")
+    code, reported = refused(tmp_path, RIG_IN_TIME, "structure.damping.loss_factor=4 %")
     assert code == 2
-    assert "0.04: only in steady vibration" in told
-    assert "structure.damping_ratio" in told
+    assert "0.04: only in steady vibration" in reported
+    assert "structure.damping_ratio" in reported

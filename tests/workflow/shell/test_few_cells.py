@@ -70,19 +70,19 @@ def test_a_contact_that_fills_its_grid_needs_more_cells_there():
     settings = ContactGrid(grid=(64, 8), size=(2.0, 1.0))
     pressure = np.zeros((64, 8))
     pressure[20:40] = 1.0
-    told = Warnings()
-    check_cells("flank", settings, Grid.covering((2.0, 1.0), (64, 8)), pressure, told)
-    (line,) = told
+    reported = Warnings()
+    check_cells("flank", settings, Grid.covering((2.0, 1.0), (64, 8)), pressure, reported)
+    (line,) = reported
     assert line.endswith("take contact.grid: [64, 14]")
 
 
 def test_one_that_has_worn_to_a_point_is_warned_of():
     settings = ContactGrid(grid=(64, 64), size=(1.0, 1.0))
-    grid, pressure, told = Grid.covering((1.0, 1.0), (64, 64)), np.zeros((64, 64)), Warnings()
-    check_cells("pad", settings, grid, pressure, told)
-    assert told == []
+    grid, pressure, reported = Grid.covering((1.0, 1.0), (64, 64)), np.zeros((64, 64)), Warnings()
+    check_cells("pad", settings, grid, pressure, reported)
+    assert reported == []
     pressure[10, 10] = 1.0
-    check_cells("pad", settings, grid, pressure, told, worn=True)
-    assert "pad is only 1 x 1 cells across after wear" in told[0]
+    check_cells("pad", settings, grid, pressure, reported, worn=True)
+    assert "pad is only 1 x 1 cells across after wear" in reported[0]
     with pytest.raises(UserError, match="its size and pressure are meaningless"):
-        check_cells("pad", settings, grid, pressure, told)
+        check_cells("pad", settings, grid, pressure, reported)

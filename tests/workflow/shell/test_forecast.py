@@ -33,10 +33,10 @@ class Clock:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    told = Clock()
-    monkeypatch.setattr("time.perf_counter", told)
-    monkeypatch.setattr(Forecast.__init__, "__defaults__", (told,))
-    return told
+    reported = Clock()
+    monkeypatch.setattr("time.perf_counter", reported)
+    monkeypatch.setattr(Forecast.__init__, "__defaults__", (reported,))
+    return reported
 
 
 def test_what_is_left_takes_what_its_share_tells(clock: Clock) -> None:
@@ -61,7 +61,7 @@ def test_what_an_earlier_run_left_tells_nothing_of_the_rest(clock: Clock) -> Non
 
 
 @pytest.mark.parametrize(
-    ("seconds", "told"),
+    ("seconds", "reported"),
     [
         (0.0, "a few seconds"),
         (17.0, "20 s"),
@@ -70,9 +70,9 @@ def test_what_an_earlier_run_left_tells_nothing_of_the_rest(clock: Clock) -> Non
         (60.0 * 3600.0, "2 days"),
     ],
 )
-def test_times_are_told_as_roughly_as_they_are_known(seconds: float, told: str) -> None:
-    assert in_words(seconds) == told
-    assert about(seconds) == (told if told == FEW else f"about {told}")
+def test_times_are_told_as_roughly_as_they_are_known(seconds: float, reported: str) -> None:
+    assert in_words(seconds) == reported
+    assert about(seconds) == (reported if reported == FEW else f"about {reported}")
 
 
 def test_a_forecast_is_told_once_and_again_where_it_changes(clock: Clock, tmp_path: Path) -> None:
@@ -82,9 +82,9 @@ def test_a_forecast_is_told_once_and_again_where_it_changes(clock: Clock, tmp_pa
         for step in range(1, 11):
             clock.now += 600.0 if step == 7 else 60.0
             reporter.reached(step / 10.0, f"step {step}")
-    told = [line[9:] for line in (tmp_path / "log").read_text().splitlines()]
+    reported = [line[9:] for line in (tmp_path / "log").read_text().splitlines()]
     # 9 steps of 60 s and 30 s; after the seventh 3 of 150 s and 30 s, 1440 s in place of 630.
-    assert told == ["wear, step 1: about 10 min to go", "wear, step 7: about 8 min to go"]
+    assert reported == ["wear, step 1: about 10 min to go", "wear, step 7: about 8 min to go"]
 
 
 def test_a_first_step_may_be_loading(clock: Clock, tmp_path: Path) -> None:
@@ -94,8 +94,8 @@ def test_a_first_step_may_be_loading(clock: Clock, tmp_path: Path) -> None:
         for step in range(1, 200):
             clock.now += 6.0 if step == 1 else 0.0625
             reporter.reached(step / 1000.0, f"step {step}")
-    told = (tmp_path / "log").read_text()[9:]
-    assert told == "motions, step 17: about 1 min to go\n"
+    reported = (tmp_path / "log").read_text()[9:]
+    assert reported == "motions, step 17: about 1 min to go\n"
 
 
 def test_parts_share_the_work_of_what_is_around_them(clock: Clock, tmp_path: Path) -> None:
@@ -106,8 +106,8 @@ def test_parts_share_the_work_of_what_is_around_them(clock: Clock, tmp_path: Pat
             with reporter.part(0.0, 0.5, "wear"):
                 clock.now += 5.0 * force - 50.0
                 reporter.reached(0.5, "95 Hz")
-    told = (tmp_path / "log").read_text()
-    assert "curves, 30 N: wear: 95 Hz: about 1 min to go" in told
+    reported = (tmp_path / "log").read_text()
+    assert "curves, 30 N: wear: 95 Hz: about 1 min to go" in reported
 
 
 # --- the loops of every analysis ------------------------------------------------------------------
@@ -124,7 +124,7 @@ SHORT = ["output.figures=false", "output.paraview=false"]
 
 
 @pytest.mark.parametrize(
-    ("name", "settings", "told"),
+    ("name", "settings", "reported"),
     [
         ("cylinder_wear.yaml", ["wear.cycles=1.2e5"], r"wear, jump 1 of about 3, 4e\+04 cycles"),
         slow("sphere_normal.yaml", [], r"contact, increment \d+ of \d+"),
@@ -134,12 +134,12 @@ SHORT = ["output.figures=false", "output.paraview=false"]
         slow("specimens_coarse.yaml", [], r"specimens, [\d.]+ N"),
     ],
 )
-def test_runs_of_every_kind_tell_how_far_they_are(every_step, tmp_path, name, settings, told):
+def test_runs_of_every_kind_tell_how_far_they_are(every_step, tmp_path, name, settings, reported):
     out = tmp_path / "out"
     settings = [*settings, *(SHORT if "paraview" in (CASES / name).read_text() else SHORT[:1])]
     done = command("run", CASES / name, "--out", out, overrides=settings)
     assert done.exit_code == 0, done.stderr
-    assert re.search(rf"{told}: (about [\d.]+ \w+|a few seconds) to go", done.stderr)
+    assert re.search(rf"{reported}: (about [\d.]+ \w+|a few seconds) to go", done.stderr)
 
 
 # --- before it begins -----------------------------------------------------------------------------
@@ -172,8 +172,8 @@ def test_runs_of_every_kind_tell_how_far_they_are(every_step, tmp_path, name, se
 def test_check_tells_the_order_of_magnitude(name: str, true: float) -> None:
     """The reference is processor seconds of shipped cases on one core, with an empty cache."""
     case = load_case(CASES / f"{name}.yaml")
-    told = analysis_of(case).run_time(case).seconds
-    assert true / 5.0 < told < 5.0 * true
+    reported = analysis_of(case).run_time(case).seconds
+    assert true / 5.0 < reported < 5.0 * true
 
 
 @pytest.mark.parametrize(
@@ -246,15 +246,15 @@ def test_jumps_that_nobody_can_count_are_said_to_be_unknown(name: str, settings:
     case = load_case(path, settings)
     expected = steps_expected(case)
     assert expected.unknown
-    told = analysis_of(case).run_time(case)
-    assert told.unknown == expected.unknown
-    assert str(ceil(expected.jumps)) in told.assumed
+    reported = analysis_of(case).run_time(case)
+    assert reported.unknown == expected.unknown
+    assert str(ceil(expected.jumps)) in reported.assumed
     printed = str(check(path, **dict(s.replace(".", "__").split("=", 1) for s in settings)))
     for lines in (command("check", path, overrides=settings).stdout, printed):
         (line,) = re.findall(r"^  time +(.*)$", lines, re.MULTILINE)
-        assert line == told.text
-        assert told.assumed in line
-        assert told.unknown in line
+        assert line == reported.text
+        assert reported.assumed in line
+        assert reported.unknown in line
 
 
 def test_a_rig_does_not_know_more_than_the_wear_that_it_waits_for() -> None:

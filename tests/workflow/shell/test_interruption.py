@@ -240,20 +240,20 @@ def refuse(*_):
 
 
 @pytest.mark.parametrize(
-    ("place", "told"),
+    ("place", "reported"),
     [
         ("workflow.shell.folders.folder.OutputFolder.claim", "is still empty; start again with"),
         ("workflow.runs.run.provenance_of", "keeps what is done; continue with `fretscale resume"),
     ],
 )
 def test_ctrl_c_before_anything_is_computed_names_the_folder(
-    start, monkeypatch, tmp_path, place, told
+    start, monkeypatch, tmp_path, place, reported
 ):
     monkeypatch.setattr(place, refuse)
     run = start(tmp_path / "out")
     assert run.ending.exit_code == 130
     (*_, line) = run.ending.stderr.splitlines()
-    assert line.startswith(f"fretscale: interrupted: {run.folder} {told}")
+    assert line.startswith(f"fretscale: interrupted: {run.folder} {reported}")
 
 
 @pytest.mark.slow
@@ -319,12 +319,12 @@ def stepwise(to, done):
 
 
 def test_workers_tell_what_they_have_done_before_they_answer():
-    told = []
+    reported = []
     with workers.workers(stepwise, [5, 3]) as team:
-        assert team.call("count", [2, 3], done=lambda: told.append(1)) == [2, 3]
-        assert len(told) == 5
+        assert team.call("count", [2, 3], done=lambda: reported.append(1)) == [2, 3]
+        assert len(reported) == 5
         assert team.call("count", [3, 0]) == [3, 0]
-    assert len(told) == 5
+    assert len(reported) == 5
 
 
 @posix_only
@@ -332,8 +332,8 @@ def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     """It ends while it receives its task: a large setting does not fit into the pipe at once."""
     monkeypatch.setattr(sys, "executable", "/bin/true")
     gone = pytest.raises(MethodFailed, match="a process of the run is gone")
-    with closing(workers.WorkerProcess()) as beside, gone:
-        beside.begin(len, bytes(1_000_000))()
+    with closing(workers.WorkerProcess()) as worker, gone:
+        worker.begin(len, bytes(1_000_000))()
 
 
 @pytest.mark.slow
@@ -355,8 +355,8 @@ def test_workers_are_born_deaf_to_ctrl_c():
 
 
 def test_a_process_beside_does_one_job_after_the_other():
-    with closing(workers.WorkerProcess()) as beside:
-        failing, *processes = beside.begin(divmod, 1, 0), *(beside.begin(os.getpid) for _ in "two")
+    with closing(workers.WorkerProcess()) as worker:
+        failing, *processes = worker.begin(divmod, 1, 0), *(worker.begin(os.getpid) for _ in "two")
         assert len({process() for process in processes} | {os.getpid()}) == 2
         with pytest.raises(ZeroDivisionError):
             failing()
@@ -364,21 +364,21 @@ def test_a_process_beside_does_one_job_after_the_other():
 
 @posix_only
 def test_a_process_beside_ends_busy_or_not():
-    with closing(workers.WorkerProcess()) as beside:
-        answer = beside.begin(time.sleep, 600.0)
+    with closing(workers.WorkerProcess()) as worker:
+        answer = worker.begin(time.sleep, 600.0)
     # Had it been waited for, it would have answered.
     with pytest.raises((MethodFailed, CancelledError)):
         answer()
 
 
 def test_tasks_are_shared_with_a_process_beside():
-    told, tasks = [], [(time.sleep, (0.2,)), (abs, (-1,)), (abs, (-2,)), (os.getpid, ())]
-    with closing(workers.WorkerProcess()) as beside:
-        _, *numbers, process = workers.share_out(tasks, beside, lambda: told.append(1))
-    assert (numbers, len(told)) == ([1, 2], 4)
+    reported, tasks = [], [(time.sleep, (0.2,)), (abs, (-1,)), (abs, (-2,)), (os.getpid, ())]
+    with closing(workers.WorkerProcess()) as worker:
+        _, *numbers, process = workers.share_out(tasks, worker, lambda: reported.append(1))
+    assert (numbers, len(reported)) == ([1, 2], 4)
     assert process != os.getpid()
-    with closing(workers.WorkerProcess()) as beside:
-        *own, process = workers.share_out([(os.getpid, ())] * 3, beside, own=2)
+    with closing(workers.WorkerProcess()) as worker:
+        *own, process = workers.share_out([(os.getpid, ())] * 3, worker, own=2)
     assert own == [os.getpid()] * 2
     assert process != os.getpid()
     assert workers.share_out(tasks)[-1] == os.getpid()
@@ -388,5 +388,5 @@ def test_tasks_are_shared_with_a_process_beside():
 def test_what_a_task_raises_is_raised_here_and_there(place):
     tasks = [(time.sleep, (0.05,)) for _ in range(4)]
     tasks[place] = divmod, (1, 0)
-    with closing(workers.WorkerProcess()) as beside, pytest.raises(ZeroDivisionError):
-        workers.share_out(tasks, beside)
+    with closing(workers.WorkerProcess()) as worker, pytest.raises(ZeroDivisionError):
+        workers.share_out(tasks, worker)

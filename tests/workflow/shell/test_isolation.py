@@ -120,13 +120,13 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
 def test_what_only_shows_a_run_fails_and_the_run_does_not(what, whole, tmp_path, monkeypatch):
     """Results equal those of a run without failures, and one warning names what is missing."""
     folder, summary = whole
-    said, fail = FAILURES[what]
+    printed, fail = FAILURES[what]
     fail(monkeypatch)
     failed = run(tmp_path)
     np.testing.assert_array_equal(curve(tmp_path), curve(folder))
     assert failed["responses"] == summary["responses"]
     (warning,) = set(failed["warnings"]) - set(summary["warnings"])
-    assert warning.startswith(said)
+    assert warning.startswith(printed)
     assert "the results are complete" in warning
     page = tmp_path / "out" / "report.html"
     assert page.exists() == (what != "report")

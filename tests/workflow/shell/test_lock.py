@@ -60,8 +60,8 @@ def ball(tmp_path):
 def left_by(out, host, process=1):
     """Write the lock of a process that has ended, with the number of a running one."""
     out.mkdir(exist_ok=True)
-    told = {"process": process, "host": host, "since": "2026-01-02 03:04:05"}
-    (out / LOCK).write_text(json.dumps(told))
+    reported = {"process": process, "host": host, "since": "2026-01-02 03:04:05"}
+    (out / LOCK).write_text(json.dumps(reported))
 
 
 def killed(process):
@@ -102,10 +102,10 @@ def test_the_lock_of_a_process_that_was_killed_is_told_and_taken(out, holder, ba
     assert (out / LOCK).exists()
     ending = invoke("run", ball, "--out", out)
     assert ending.exit_code == 0, ending.stderr
-    told = f"process {holder.pid} on {socket.gethostname()} since "
-    assert ending.stderr.startswith(told)
+    reported = f"process {holder.pid} on {socket.gethostname()} since "
+    assert ending.stderr.startswith(reported)
     assert "is gone and left its lock" in ending.stderr
-    assert told in (out / "run.log").read_text()
+    assert reported in (out / "run.log").read_text()
     assert json.loads((out / "summary.json").read_text())["warnings"] == []
     assert not (out / LOCK).exists()
 
@@ -176,8 +176,8 @@ for _ in range(100):
     command = [sys.executable, "-c", code, str(tmp_path)]
     processes = [subprocess.Popen(command, stderr=subprocess.PIPE) for _ in range(4)]
     for process in processes:
-        _, said = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0, said.decode()
+        _, printed = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, printed.decode()
 
 
 @posix_only

@@ -22,11 +22,11 @@ from workflow.shell.output.measured import (
     MeasuredPoints,
     check_measured,
     compared,
-    doubts_of_measured,
+    comparison_warnings,
     lines_of_measured,
     read_points,
+    reported,
     tell_measured,
-    told,
 )
 from workflow.shell.output.quantities import CurvesOf
 from workflow.shell.output.results import writing
@@ -61,13 +61,13 @@ def test_noise_of_known_size_has_its_chi_square_and_points_on_the_curve_have_non
     x = np.linspace(0.0, 1.0, 101)
     line = curve(x, 2.0 * x + 1.0)
     places, sigma = np.linspace(0.01, 0.99, 400), 0.05
-    exact = told(compared(entry(), line, MeasuredPoints(places, 2.0 * places + 1.0, None)))
+    exact = reported(compared(entry(), line, MeasuredPoints(places, 2.0 * places + 1.0, None)))
     assert exact["rms_deviation"] < 1e-14
     assert exact["interpolation_error"] < 1e-14
     assert "reduced_chi_square" not in exact
     noise = np.random.default_rng(7).normal(0.0, sigma, places.size)
     points = MeasuredPoints(places, 2.0 * places + 1.0 + noise, np.full(places.size, sigma))
-    found = told(compared(entry(), line, points))
+    found = reported(compared(entry(), line, points))
     # For n independent points chi² per point is 1 with a standard deviation of sqrt(2/n).
     assert abs(found["reduced_chi_square"] - 1.0) < 4.0 * np.sqrt(2.0 / places.size)
     assert found["mean_deviation"] == pytest.approx(-noise.mean(), abs=1e-14)
@@ -92,16 +92,18 @@ def test_loop_is_compared_with_its_nearest_branch_and_nothing_is_extrapolated() 
     angle = np.linspace(0.0, 2.0 * np.pi, 4001)
     circle = curve(np.cos(angle), np.sin(angle))
     points = MeasuredPoints(np.array([0.6, 0.6, 1.5]), np.array([0.8, -0.7, 0.0]), None)
-    found = told(compared(entry(), circle, points))
+    found = reported(compared(entry(), circle, points))
     assert found["nearest_of_several_branches"]
     assert found["outside"] == [1.5]
     assert found["points"] == 2
     assert found["largest"]["computed"] == pytest.approx(-0.8, abs=1e-5)
     assert found["mean_deviation"] == pytest.approx(-0.05, abs=1e-5)
-    none = told(compared(entry(), circle, MeasuredPoints(np.array([2.0]), np.array([0.0]), None)))
+    none = reported(
+        compared(entry(), circle, MeasuredPoints(np.array([2.0]), np.array([0.0]), None))
+    )
     assert none["points"] == 0
     assert not list(lines_of_measured([none]))
-    assert "not computed at 2" in next(doubts_of_measured([none]))
+    assert "not computed at 2" in next(comparison_warnings([none]))
 
 
 def test_table_is_read_in_its_units_with_deviations(tmp_path: Path) -> None:
@@ -167,7 +169,7 @@ def test_what_cannot_be_compared_is_a_warning_not_the_end_of_a_run(results: Path
     assert good["curve"] == "depth, pad"
     assert good["mean_deviation"] == pytest.approx(-3e-3 + 3e-5)
     assert "allowed: depth, pad; volume, pad" in nowhere["refused"]
-    assert len(list(doubts_of_measured([good, nowhere]))) == 1
+    assert len(list(comparison_warnings([good, nowhere]))) == 1
 
 
 @pytest.mark.parametrize(

@@ -33,16 +33,16 @@ def without_times(lines: list[str]) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("loudness", "heard"),
+    ("loudness", "received"),
     [
         (Loudness.QUIET, ["warning: too coarse"]),
         (Loudness.NORMAL, ["a line", "warning: too coarse"]),
         (Loudness.VERBOSE, ["a line", "a detail", "warning: too coarse", "mesh: ... s"]),
     ],
 )
-def test_the_log_has_all_however_quiet_it_is(loudness, heard, tmp_path, capsys):
+def test_the_log_has_all_however_quiet_it_is(loudness, received, tmp_path, capsys):
     said_by(Reporter(tmp_path / "log", loudness=loudness))
-    assert without_times(capsys.readouterr().err.splitlines()) == heard
+    assert without_times(capsys.readouterr().err.splitlines()) == received
     logged = [line[9:] for line in (tmp_path / "log").read_text("utf-8").splitlines()]
     assert without_times(logged) == ["a line", "a detail", "warning: too coarse", "mesh: ... s"]
 
@@ -69,8 +69,8 @@ def terminal(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
 def test_a_stage_shows_how_far_it_is(terminal, tmp_path, monkeypatch):
     monkeypatch.setattr("workflow.shell.terminal.reporter.LOOK", -1.0)
     reporter = Reporter(tmp_path / "log")
-    with reporter.stage("condensation", "bodies") as told:
-        told(1, 2)
+    with reporter.stage("condensation", "bodies") as reported:
+        reported(1, 2)
         reporter._screen._rows.refresh()
     reporter.close()
     (row,) = {line for line in terminal().splitlines() if "1 of 2 bodies" in line}
@@ -101,10 +101,10 @@ def test_where_there_is_no_terminal_a_line_now_and_then(tmp_path, monkeypatch, c
     now = [100.0]
     monkeypatch.setattr("time.perf_counter", lambda: now[0])
     reporter = Reporter(tmp_path / "log")
-    with reporter.stage("condensation", "nodes") as told:
+    with reporter.stage("condensation", "nodes") as reported:
         for number in range(1, 1001):
             now[0] += 0.6
-            told(number, 1000)
+            reported(number, 1000)
     reporter.close()
     lines = capsys.readouterr().err.splitlines()
     assert 600.0 / LINE - 2 < len(lines) <= 600.0 / LINE
@@ -134,10 +134,10 @@ def to_try() -> list[list[str]]:
 
 
 def test_without_arguments_it_says_what_to_try() -> None:
-    told = CliRunner().invoke(cli, [])
-    assert (told.exit_code, told.stderr) == (0, "")
-    assert TO_TRY in told.stdout
-    assert max(map(len, told.stdout.splitlines())) <= 80
+    reported = CliRunner().invoke(cli, [])
+    assert (reported.exit_code, reported.stderr) == (0, "")
+    assert TO_TRY in reported.stdout
+    assert max(map(len, reported.stdout.splitlines())) <= 80
     assert [arguments[0] for arguments in to_try()] == ["new", "check", "run"]
 
 
@@ -150,11 +150,11 @@ def test_what_it_says_to_try_works_and_leaves_a_picture(tmp_path, monkeypatch):
 
 
 def test_the_help_lists_every_command_once() -> None:
-    told = CliRunner().invoke(cli, ["--help"], terminal_width=80).stdout
-    assert all(f"{title}:" in told for title in LISTED)
+    reported = CliRunner().invoke(cli, ["--help"], terminal_width=80).stdout
+    assert all(f"{title}:" in reported for title in LISTED)
     assert {name for names in LISTED.values() for name in names} == set(cli.commands)
-    rows = [line.split()[0] for line in told.splitlines() if line.startswith("  ")]
+    rows = [line.split()[0] for line in reported.splitlines() if line.startswith("  ")]
     for name in cli.commands:
         assert rows.count(name) == 1
-    assert max(map(len, told.splitlines())) <= 80
-    assert not any(line.endswith("...") for line in told.splitlines()[1:])
+    assert max(map(len, reported.splitlines())) <= 80
+    assert not any(line.endswith("...") for line in reported.splitlines()[1:])

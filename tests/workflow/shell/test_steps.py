@@ -16,7 +16,7 @@ from workflow.errors import UserError
 from workflow.shell.folders import checkpoint, packing, steps
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.packing import PackingError, packed, unpacked
-from workflow.shell.folders.steps import RunSteps, kept_steps
+from workflow.shell.folders.steps import RunSteps, resumable_steps
 from workflow.shell.terminal.reporter import Reporter
 
 PROVENANCE = {"case": {"title": "steps"}, "input_files": {}, "choice": None}
@@ -78,7 +78,7 @@ def worked(folder, most=-1):
     """Return result, warnings, and amount of work; the result is None if interrupted."""
     run = run_in(folder)
     try:
-        with kept_steps(run) as taken_by:
+        with resumable_steps(run) as taken_by:
             work = Work(taken_by, run.reporter, most)
             return work.all(), run.reporter.warnings, work.done
     except CutOff:
@@ -142,7 +142,7 @@ def test_states_are_saved_as_time_allows(monkeypatch, tmp_path):
             now[0] += seconds
             return jump + 1
 
-        with pytest.raises(CutOff), kept_steps(run) as taken_by:
+        with pytest.raises(CutOff), resumable_steps(run) as taken_by:
             taken_by.march("jump", 0, advance)
         run.reporter.close()
         assert written[-1] == count

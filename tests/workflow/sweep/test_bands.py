@@ -36,12 +36,12 @@ def even(power, columns):
 
 def test_a_sample_has_the_bounds_of_the_fit():
     """Medians and 95 % bounds equal those of the fit, also for a profile and a logarithm."""
-    told = [
+    reported = [
         parameter("a", 3.0, (2.0, 3.5)),
         parameter("b", 1e9, (1e8, 1e10), logarithmic=True),
         parameter("c", 0.99, (0.95, 1.03), allowed=(0.0, 1.0)),
     ]
-    values = FittedSample(tuple(told), np.eye(3)).draw(even(12, 3))
+    values = FittedSample(tuple(reported), np.eye(3)).draw(even(12, 3))
     found = np.quantile(values, [0.025, 0.5, 0.975], axis=0)
     expected = [[2.0, 3.0, 3.5], [1e8, 1e9, 1e10], [0.95, 0.99, 1.0]]
     np.testing.assert_allclose(found.T, expected, rtol=5e-3)
@@ -55,8 +55,8 @@ def test_correlation_is_that_of_the_fit_and_bands_are_of_first_order():
     volume = 5.0 * energy + 2.0 + 0.1 * rng.standard_normal(40)
     line = volume_problem([VolumeData("both", energy, volume)], VolumeLaw(offset="intercept"))
     found = fit(line.problem)
-    told = [parameter(one.name, one.value, one.bounds) for one in found.estimates]
-    sample = FittedSample(tuple(told), found.correlation)
+    reported = [parameter(one.name, one.value, one.bounds) for one in found.estimates]
+    sample = FittedSample(tuple(reported), found.correlation)
     values = sample.draw(even(12, 2))
     assert np.corrcoef(values.T)[0, 1] == pytest.approx(found.correlation[0, 1], abs=5e-3)
     at = np.array([0.5, 3.5, 10.0])
@@ -74,8 +74,8 @@ def test_bands_of_fits_hold_the_truth():
         slope = float(energy @ volume / (energy @ energy))
         scatter = np.sum((volume - slope * energy) ** 2) / 5.0
         reach = 2.570582 * np.sqrt(scatter / (energy @ energy))  # Student, 5 degrees of freedom
-        told = parameter("slope", slope, (slope - reach, slope + reach))
-        band = band_of(at * FittedSample((told,), np.eye(1)).draw(normal)[:, 0])
+        reported = parameter("slope", slope, (slope - reach, slope + reach))
+        band = band_of(at * FittedSample((reported,), np.eye(1)).draw(normal)[:, 0])
         hits += band["lower"] <= truth * at <= band["upper"]
     assert 0.92 * 300 <= hits <= 0.98 * 300
 
@@ -157,9 +157,9 @@ def told_by_fit(**changes):
 
 @pytest.fixture
 def load(tmp_path):
-    def make(text, told):
+    def make(text, reported):
         (tmp_path / "contact.yaml").write_text(BALL, encoding="utf-8")
-        (tmp_path / "fit.json").write_text(json.dumps(told), encoding="utf-8")
+        (tmp_path / "fit.json").write_text(json.dumps(reported), encoding="utf-8")
         path = tmp_path / "sweep.yaml"
         path.write_text(f"case: contact.yaml\nfit: fit.json\n{text}", encoding="utf-8")
         return load_sweep(path)

@@ -23,11 +23,13 @@ NORMAL = 1.959963984540054
 
 def sample_of(deviations, correlation=None):
     """Return parameters of means 1, 2, 3, ... and relative ``deviations``."""
-    told = [
+    reported = [
         parameter(f"p{mean}", mean, (mean * (1 - NORMAL * d), mean * (1 + NORMAL * d)))
         for mean, d in enumerate(deviations, 1)
     ]
-    return FittedSample(tuple(told), np.eye(len(told)) if correlation is None else correlation)
+    return FittedSample(
+        tuple(reported), np.eye(len(reported)) if correlation is None else correlation
+    )
 
 
 def test_what_is_linear_has_g_c_gt():
@@ -41,9 +43,9 @@ def test_what_is_linear_has_g_c_gt():
     assert found.half == pytest.approx(NORMAL * np.sqrt(g @ tied @ g))
     assert found.error < 1e-12 * found.half
     volume = first_order(sample_of((0.1,)).draw(positions(1))[:, 0] * 50.0 * 0.2 / 3500.0)
-    told = volume.told()
+    reported = volume.reported()
     half = NORMAL * 0.1 * 50.0 * 0.2 / 3500.0
-    assert told["upper"] - told["lower"] == pytest.approx(2.0 * half, rel=1e-9)
+    assert reported["upper"] - reported["lower"] == pytest.approx(2.0 * half, rel=1e-9)
 
 
 @pytest.mark.parametrize("deviation", [0.03, 0.1, 0.3])
@@ -69,7 +71,7 @@ def test_what_is_not_linear_is_told(law, correlation, deviation):
         assert off < 1.35 * found.error + 2e-3 * found.half
     else:
         assert off > 0.04 * found.half
-        assert found.told() is None
+        assert found.reported() is None
 
 
 def load(folder, text):

@@ -177,8 +177,8 @@ def test_nonsense_is_told_before_anything_runs(tmp_path, text, line, words):
     path = write(tmp_path, text)
     result = sweep(path, tmp_path / "out")
     assert result.exit_code == 2
-    (told,) = [message for message in result.stderr.splitlines() if words in message]
-    assert told.startswith(f"fretscale: {path}:{line}: ")
+    (reported,) = [message for message in result.stderr.splitlines() if words in message]
+    assert reported.startswith(f"fretscale: {path}:{line}: ")
     assert not (tmp_path / "out").exists()
 
 
@@ -201,8 +201,8 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path, what):
         (out / "mine").write_text("mine")
     result = sweep(path, out)
     assert result.exit_code == 2
-    (told,) = result.stderr.splitlines()
-    assert told.startswith(f"fretscale: {out}: ")
+    (reported,) = result.stderr.splitlines()
+    assert reported.startswith(f"fretscale: {out}: ")
 
 
 def test_a_scheduler_does_not_go_with_processes(tmp_path):
@@ -271,10 +271,10 @@ def test_summary_tells_the_spread(done):
     assert summary["runs"] == 4
     assert len(summary["failed"]) == 2
     energies = [float(row["states.-1.cumulative_energy"]) for row in table(out)[2:]]
-    told = summary["found"]["states.-1.cumulative_energy"]
-    assert (told["least"], told["largest"]) == (min(energies), max(energies))
-    assert told["median"] == pytest.approx(np.mean(energies), rel=1e-12)
-    assert told["deviation"] == pytest.approx(abs(np.diff(energies)[0]) / np.sqrt(2), rel=1e-12)
+    reported = summary["found"]["states.-1.cumulative_energy"]
+    assert (reported["least"], reported["largest"]) == (min(energies), max(energies))
+    assert reported["median"] == pytest.approx(np.mean(energies), rel=1e-12)
+    assert reported["deviation"] == pytest.approx(abs(np.diff(energies)[0]) / np.sqrt(2), rel=1e-12)
 
 
 def test_figures_are_drawn_against_all_that_varies(done):

@@ -227,11 +227,11 @@ def test_files_of_a_joint(tmp_path):
 
 
 def test_reported_values_are_told_beside_the_computed(tmp_path):
-    told = (
+    reported = (
         "reported=[{quantity: states.-1.energy_per_cycle, value: 3 mJ, source: a test}, "
         "{quantity: states.0.colour, value: 1, source: a test}]"
     )
-    summary = run(tmp_path, JOINT, told)
+    summary = run(tmp_path, JOINT, reported)
     assert summary["reported"][0] == {
         "quantity": "states.-1.energy_per_cycle",
         "reported": 3.0,

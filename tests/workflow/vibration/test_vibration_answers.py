@@ -102,6 +102,6 @@ def test_a_curve_that_does_not_get_there_says_so(tmp_path):
     ],
 )
 def test_nonsense_is_refused_with_its_place(tmp_path, entry, message):
-    code, told = refused(tmp_path, ONE_MASS, entry)
+    code, reported = refused(tmp_path, ONE_MASS, entry)
     assert code == 2
-    assert message in told
+    assert message in reported

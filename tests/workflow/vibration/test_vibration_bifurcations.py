@@ -101,7 +101,7 @@ def test_closed_branches_are_found_from_a_start(tmp_path: Any) -> None:
     The curve from the ends of the frequencies has too few harmonics where it folds, and reports
     this.
     """
-    summary, told = run(tmp_path, SUBHARMONIC)
+    summary, reported = run(tmp_path, SUBHARMONIC)
     branches = summary["further_branches"]
     assert [branch["closed"] for branch in branches] == [True] * 3
     for branch in branches:
@@ -109,5 +109,5 @@ def test_closed_branches_are_found_from_a_start(tmp_path: Any) -> None:
         assert kinds == {"fold"}
         assert branch["lowest_frequency"] == pytest.approx(184.07, rel=1e-3)
         assert branch["highest_frequency"] == pytest.approx(412.5, rel=1e-3)
-    assert "closed" in told
-    assert "the fold at 392.1 Hz is not one of the motion itself" in " ".join(told.split())
+    assert "closed" in reported
+    assert "the fold at 392.1 Hz is not one of the motion itself" in " ".join(reported.split())

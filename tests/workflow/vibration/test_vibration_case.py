@@ -69,9 +69,9 @@ def test_free_and_stuck_joints_leave_the_rig_linear(tmp_path, friction, held):
     assert response["error"] < 1e-12
     assert curve["frequency"][[0, -1]].tolist() == [20.0, 300.0]
     squares = np.sort(np.linalg.eigvals(np.linalg.solve(MASS, linear_rig(held)[0])).real)
-    told = (2.0 * np.pi * np.array(summary["stuck" if held else "free"])) ** 2
+    reported = (2.0 * np.pi * np.array(summary["stuck" if held else "free"])) ** 2
     # Rounding is that of the largest, 4000 times the least.
-    np.testing.assert_allclose(told, squares, rtol=0.0, atol=1e-12 * squares[-1])
+    np.testing.assert_allclose(reported, squares, rtol=0.0, atol=1e-12 * squares[-1])
     assert curve["slip"].max() == (0.0 if held else 1.0)
     # It lies between the points of the curve, higher than both.
     grid = np.linspace(0.99, 1.01, 2001) * response["resonance"]

@@ -171,9 +171,9 @@ OPPOSED = (
     ],
 )
 def test_nonsense_is_refused_with_its_place(tmp_path, settings, message):
-    code, told = refused(tmp_path, RIG, *settings)
+    code, reported = refused(tmp_path, RIG, *settings)
     assert code == 2
-    assert message in told
+    assert message in reported
 
 
 @pytest.mark.parametrize(
@@ -188,9 +188,9 @@ def test_nonsense_is_refused_with_its_place(tmp_path, settings, message):
 def test_records_of_no_period_are_refused(tmp_path, rows, message):
     (tmp_path / "period.csv").write_text(rows, encoding="utf-8")
     record = "excitation={records: [{points: m1, file: period.csv}]}"
-    code, told = refused(tmp_path, RIG, "forces=", record)
+    code, reported = refused(tmp_path, RIG, "forces=", record)
     assert code == 2
-    assert message in told
+    assert message in reported
 
 
 BODY = """\
@@ -237,10 +237,10 @@ def test_a_reduced_body_is_driven_at_its_points_and_by_its_ground(tmp_path):
 def test_a_body_needs_one_way_to_be_driven_and_no_hidden_support(tmp_path):
     save_reduced(tmp_path / "body.h5", two_masses())
     driven = "structure.driven={points: a, direction: x}"
-    code, told = refused(tmp_path, BODY, driven)
-    assert (code, "names its places; allowed: one of them" in told) == (2, True)
-    code, told = refused(tmp_path, BODY, "excitation=", "forces=[1 N]")
-    assert (code, "missing; allowed: points and direction of the force" in told) == (2, True)
+    code, reported = refused(tmp_path, BODY, driven)
+    assert (code, "names its places; allowed: one of them" in reported) == (2, True)
+    code, reported = refused(tmp_path, BODY, "excitation=", "forces=[1 N]")
+    assert (code, "missing; allowed: points and direction of the force" in reported) == (2, True)
     save_reduced(tmp_path / "body.h5", two_masses(held=1e3))
-    code, told = refused(tmp_path, BODY)
-    assert (code, "excitation.base.0: the reduced body is held inside" in told) == (2, True)
+    code, reported = refused(tmp_path, BODY)
+    assert (code, "excitation.base.0: the reduced body is held inside" in reported) == (2, True)

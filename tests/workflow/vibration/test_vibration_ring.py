@@ -155,6 +155,6 @@ def test_what_is_no_ring_is_refused(tmp_path, settings, message):
     ],
 )
 def test_places_that_a_sector_has_not_are_refused(tmp_path, settings, message):
-    code, told = refused(tmp_path, BLADES, *settings)
+    code, reported = refused(tmp_path, BLADES, *settings)
     assert code == 2
-    assert message in told
+    assert message in reported

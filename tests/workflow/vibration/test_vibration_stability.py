@@ -80,7 +80,7 @@ def test_without_stability_nothing_is_written(tmp_path: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "printed"),
     [
         ("force: 2 N, freq", "force: 3 N, freq", "not among those of the case"),
         ("frequency: 200 Hz", "frequency: 400 Hz", "outside"),
@@ -89,13 +89,15 @@ def test_without_stability_nothing_is_written(tmp_path: Any) -> None:
         ("law: polynomial_spring", "law: elastic_stop", "cubic"),
     ],
 )
-def test_nonsense_is_refused_with_its_place(tmp_path: Any, old: str, new: str, said: str) -> None:
+def test_nonsense_is_refused_with_its_place(
+    tmp_path: Any, old: str, new: str, printed: str
+) -> None:
     path = tmp_path / "case.yaml"
     text = CASE + ("stability: maybe\n" if old.startswith("stability") else "")
     path.write_text(text.replace(old, new), encoding="utf-8")
     result = invoke("check", path)
     assert result.exit_code == 2
-    assert said in result.output
+    assert printed in result.output
 
 
 def test_a_stop_without_even_harmonics_is_doubted(tmp_path: Any) -> None:
@@ -118,8 +120,8 @@ def test_a_body_that_contacts_alone_hold_takes_little_memory() -> None:
     problem = HarmonicBalance(rig.model, PeriodicMarch(law), load, Resolution((0, 1, 3), 32))
     motion = problem.solve(600.0, 25.0)
     tracemalloc.start()
-    told = Floquet(problem).stability(motion)
+    reported = Floquet(problem).stability(motion)
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert told.verdict == "stable"
+    assert reported.verdict == "stable"
     assert most < 1e8

@@ -293,8 +293,8 @@ def test_figures_are_drawn(ended, tmp_path):
     from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents
     from workflow.pictures.drawing import write_figures
 
-    told = ANALYSIS.pictures, VibrationWearContents(at_nodes=False), ended / "results.h5"
-    drawn = {path.stem for path in write_figures(*told, tmp_path)}
+    reported = ANALYSIS.pictures, VibrationWearContents(at_nodes=False), ended / "results.h5"
+    drawn = {path.stem for path in write_figures(*reported, tmp_path)}
     assert drawn == {"frequency_response", "evolution", "scar", "loops"}
 
 
@@ -302,7 +302,7 @@ def test_figures_are_drawn(ended, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "said"),
+    ("before", "after", "printed"),
     [
         ("body_2: {young: 200 GPa", "body_2: {young: 100 GPa", "dissimilar materials"),
         ("coefficient: 0.4", "coefficient: 0", "no friction"),
@@ -310,16 +310,16 @@ def test_figures_are_drawn(ended, tmp_path):
         ("grid: [16, 16]", "grid: [16, 2000, 1]", "contact.file: "),
     ],
 )
-def test_contacts_that_cannot_be_a_joint_are_refused(tmp_path, before, after, said):
+def test_contacts_that_cannot_be_a_joint_are_refused(tmp_path, before, after, printed):
     assert before in WEAR
-    assert said in refusal(tmp_path, wear=WEAR.replace(before, after))
+    assert printed in refusal(tmp_path, wear=WEAR.replace(before, after))
 
 
 def test_a_case_of_something_else_is_no_contact(tmp_path):
     assert "'rig.yaml': the case itself" in refusal(tmp_path, "contact.file=rig.yaml")
     (tmp_path / "other.yaml").write_text(RIG, encoding="utf-8")
-    said = refusal(tmp_path, "contact.file=other.yaml")
-    assert "no case of wear of two bodies over an area" in said
+    printed = refusal(tmp_path, "contact.file=other.yaml")
+    assert "no case of wear of two bodies over an area" in printed
 
 
 def test_cycles_and_forces_ascend_and_the_mass_is_there(tmp_path):

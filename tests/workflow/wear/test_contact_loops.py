@@ -21,7 +21,7 @@ from workflow.analyses.wear.output.layout import LAYOUT
 from workflow.analyses.wear.output.loop_table import COLUMNS
 from workflow.analyses.wear.worn.contact_loops import (
     MEASURED,
-    kept_loops,
+    stored_loops,
     warn_of_border,
     write_loops,
 )
@@ -165,7 +165,7 @@ def with_loops(root, loop, line=False):
     folder = OutputFolder(root)
     kept = [{"cycles": 100.0 * jump} for jump in range(3)]
     for jump in (0, 2):
-        kept[jump] |= kept_loops(["sphere"], [loop])
+        kept[jump] |= stored_loops(["sphere"], [loop])
     with writing(folder.results, LAYOUT, line) as writer:
         write_loops(writer, kept)
         writer.put_grid("grid/sphere", Grid((32, 32), (0.1, 0.1)))
@@ -240,15 +240,15 @@ def test_kinetics_show_area_and_the_band_of_the_extrapolation(results, tmp_path)
 
 
 def test_warning_of_a_contact_that_outgrows_its_grid():
-    said = []
-    reporter = SimpleNamespace(warn=said.append)
+    printed = []
+    reporter = SimpleNamespace(warn=printed.append)
     loops = {"face": {"unworn": {"border_load": 0.0}, "worn": {"border_load": 0.02}}}
     warn_of_border(loops, Loops(amplitude=5e-3), reporter)  # then the run has said so
-    assert not said
+    assert not printed
     warn_of_border(loops, Loops(amplitude=5e-3, normal_force=1e4), reporter)
-    assert len(said) == 1
-    assert "face: in the tangential loops" in said[0]
-    assert "2.0 %" in said[0]
+    assert len(printed) == 1
+    assert "face: in the tangential loops" in printed[0]
+    assert "2.0 %" in printed[0]
 
 
 # --- runs ---------------------------------------------------------------------------------------

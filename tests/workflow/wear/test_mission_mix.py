@@ -266,7 +266,7 @@ HEADER = "P, Qx, Qy, Mx, My, Mz, Edx, Edy, block, share [%]\n"
 
 
 @pytest.mark.parametrize(
-    ("rows", "told"),
+    ("rows", "reported"),
     [
         ([(1, 70), (1, 70), (2, 20)], "the shares of all blocks add up to 0.9"),
         ([(1, 70), (2, 30), (1, 70)], "a block that had ended"),
@@ -274,12 +274,12 @@ HEADER = "P, Qx, Qy, Mx, My, Mz, Edx, Edy, block, share [%]\n"
         ([(1, 120), (2, -20)], "share: 120: out of range; allowed: 0 to 1"),
     ],
 )
-def test_blocks_that_are_no_mix_are_refused(tmp_path, rows, told):
+def test_blocks_that_are_no_mix_are_refused(tmp_path, rows, reported):
     table = "".join(f"100, 0, 0, 0, 0, 0, 0, 0, {block}, {share}\n" for block, share in rows)
     (tmp_path / "loads.csv").write_text(HEADER + table, encoding="utf-8")
     with pytest.raises(InputFileError) as refusal:
         read_resultants(tmp_path / "loads.csv")
-    assert told in str(refusal.value)
+    assert reported in str(refusal.value)
 
 
 def test_a_share_needs_its_block(tmp_path):

@@ -205,8 +205,8 @@ def test_paraboloid_is_straight_without_a_radius():
 @pytest.mark.parametrize("line", [False, True], ids=["area", "line"])
 def test_heights_are_their_own_on_their_grid_and_bilinear_elsewhere(line):
     size = 4.0, 6.0
-    grid = Grid.strips(4.0, 12) if line else Grid.covering(size, (12, 9))
-    other = Grid.strips(4.0, 31) if line else Grid.covering(size, (31, 8))
+    grid = Grid.line_contact(4.0, 12) if line else Grid.covering(size, (12, 9))
+    other = Grid.line_contact(4.0, 31) if line else Grid.covering(size, (31, 8))
     rough = np.random.default_rng(0).random(grid.shape)
     np.testing.assert_array_equal(GridHeights(grid, rough)(grid.x, grid.y), rough, strict=True)
     plane = 1.0 + 2.0 * grid.x + 0.3 * grid.y + 0.5 * grid.x * grid.y
@@ -266,9 +266,9 @@ def test_worn_surface_goes_back_to_the_nodes(typed):
         "worn_nodes_early_body_1.csv",
         "worn_nodes_early_body_2.csv",
     ]
-    told = summary["early"]["worn_nodes"]
-    assert told["body_1"]["volume_share"] == pytest.approx(1.0, rel=1e-12)
-    assert 0.1 < told["body_2"]["volume_share"] < 0.9
+    reported = summary["early"]["worn_nodes"]
+    assert reported["body_1"]["volume_share"] == pytest.approx(1.0, rel=1e-12)
+    assert 0.1 < reported["body_2"]["volume_share"] < 0.9
     assert any("early, body_2: the nodes carry" in warning for warning in summary["warnings"])
     assert not any("body_1" in warning for warning in summary["warnings"])
     moved = {body: displacements(folder / f"worn_nodes_early_body_{body}.csv") for body in (1, 2)}
@@ -345,10 +345,10 @@ def test_a_table_without_moments_holds_the_tilt(tmp_path):
 def test_pictures_of_resultants_alone(typed, tmp_path):
     """Figures leave out what another code does not provide; ParaView shows every face."""
     results = typed[0] / "results.h5"
-    told = ANALYSIS.pictures, contents_of(typed[0]), results
-    figures = {path.stem for path in write_figures(*told, tmp_path / "figures")}
+    reported = ANALYSIS.pictures, contents_of(typed[0]), results
+    figures = {path.stem for path in write_figures(*reported, tmp_path / "figures")}
     assert {"resultants", "half_space_and_structure", "pressure_maps", "kinetics"} <= figures
-    written = {path.name for path in write_paraview(*told, tmp_path / "paraview")}
+    written = {path.name for path in write_paraview(*reported, tmp_path / "paraview")}
     assert {"early.pvd", "late.pvd", "never.pvd", "flank_early_body_1.stl"} <= written
 
 
@@ -383,18 +383,18 @@ def test_our_loads_through_files_wear_the_same_bit_for_bit(small_path, tmp_path,
             for body in ("body_1", "body_2"):
                 key = f"surfaces/{interface}/{last}/{body}"
                 assert ours[key][()].tobytes() == read[key][()].tobytes(), key
-            told = original["structure"]["closure"], original["structure"]["cycles"]
-            assert tuple(ours[f"structure/{interface}"].attrs[k] for k in CLOSING) == told
-    assert f"the last of {told[1]} cycles marched" in (tmp_path / "resultants.log").read_text()
+            reported = original["structure"]["closure"], original["structure"]["cycles"]
+            assert tuple(ours[f"structure/{interface}"].attrs[k] for k in CLOSING) == reported
+    assert f"the last of {reported[1]} cycles marched" in (tmp_path / "resultants.log").read_text()
     for interface in ("intrados", "extrados"):
         assert imported[interface]["depth_1"] > 0.0
         assert imported[interface]["slip_per_cycle"] == original[interface]["slip_per_cycle"]
-        for told in imported[interface]["worn_nodes"].values():
-            assert told["volume_share"] == pytest.approx(1.0, rel=1e-12)
+        for reported in imported[interface]["worn_nodes"].values():
+            assert reported["volume_share"] == pytest.approx(1.0, rel=1e-12)
 
 
-@pytest.mark.parametrize(("closure", "told"), [(9e-4, 0), (2e-3, 1)])
-def test_loads_that_do_not_close_are_warned_of(tmp_path, closure, told):
+@pytest.mark.parametrize(("closure", "reported"), [(9e-4, 0), (2e-3, 1)])
+def test_loads_that_do_not_close_are_warned_of(tmp_path, closure, reported):
     rows = [f"{row}, {closure}" for row in LINE_TABLE.splitlines()[1:]]
     table = [f"{LINE_TABLE.splitlines()[0]}, closure", *rows]
     (tmp_path / "loads.csv").write_text("\n".join(table), encoding="utf-8")
@@ -402,7 +402,7 @@ def test_loads_that_do_not_close_are_warned_of(tmp_path, closure, told):
     case = parse_case(text, str(tmp_path / "case.yaml"))
     reporter = Reporter(tmp_path / "log")
     warn_of_file(ResultantsSource(case), reporter)
-    assert len(reporter.warnings) == told
+    assert len(reporter.warnings) == reported
     assert all("0.20 % of the largest" in line for line in reporter.warnings)
 
 

@@ -53,9 +53,9 @@ def balances(run, laws):
 
 def test_largest_stresses_are_told_with_place_and_error(whole):
     """They equal the results; the largest principal stress in notches is along the surface."""
-    told = whole.summary["structure"]["peak_stress"]
+    reported = whole.summary["structure"]["peak_stress"]
     with h5py.File(whole.folder / "results.h5") as file:
-        for moment, bodies in told.items():
+        for moment, bodies in reported.items():
             for name, peak in bodies.items():
                 group = file[f"bodies/{name}/{moment}"]
                 values, points = group["von_mises"][()], group["points"][()]
@@ -315,10 +315,10 @@ def test_constant_resultants_never_drift(start, whole, tmp_path):
 def test_warnings(start, tmp_path, overrides, words):
     run = start(tmp_path / "out", "wear.cycles=1e6", *QUICK, *overrides)
     assert run.ending.exit_code == 0, run.ending.stderr
-    told = " ".join(run.ending.stderr.split())
+    reported = " ".join(run.ending.stderr.split())
     for some in words:
         assert any(some in warning for warning in run.summary["warnings"]), some
-        assert some in told
+        assert some in reported
 
 
 # --- odd cases ----------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from workflow.kinds import load_case
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 
-PLANE = Blocks((-40, 40), 40, (-20, 20), 20, (-14, 14), strips=128)
+PLANE = Blocks((-40, 40), 40, (-20, 20), 20, (-14, 14), line_contact=128)
 BARE = {"unit": "mm", "level": "none"}
 
 
@@ -103,10 +103,10 @@ def test_what_the_nodes_do_not_follow_is_told(blocks):
     assert abs(face.face.nodal_areas @ face.at_nodes()) < 1e-9
     numbers = face.summary()["body_1"]
     assert 0.9 < numbers["lost_by_nodes"] / numbers["rms_on_grid"] < 1.0
-    ((name, told),) = face.outline()
+    ((name, reported),) = face.outline()
     assert name == "surface 1"
-    assert told.startswith("foot: 120 x 120 points 10 µm apart, 0.707 µm rms, ")
-    assert told.endswith(" µm finer than the nodes")
+    assert reported.startswith("foot: 120 x 120 points 10 µm apart, 0.707 µm rms, ")
+    assert reported.endswith(" µm finer than the nodes")
     grid = Grid.over(face.grid.size, (8, 8), line=False)
     transfer = FaceTransfer.between(face.face, grid)
     cells = np.random.default_rng(0).normal(size=grid.shape)
@@ -117,12 +117,12 @@ def test_what_the_nodes_do_not_follow_is_told(blocks):
 def test_scans_that_do_not_fit_a_face_are_refused(blocks):
     place = "structure.contacts.0.surfaces.body_1.file"
     with_surfaces(blocks, body_1={"file": "plane.npy", "shift": [0.2, 0], **SCAN})
-    said = refused(blocks)
-    assert f"{place}: " in said
-    assert "1.2 mm x 1.2 mm, ends within the grid of 1 mm x 1 mm where it is put" in said
+    printed = refused(blocks)
+    assert f"{place}: " in printed
+    assert "1.2 mm x 1.2 mm, ends within the grid of 1 mm x 1 mm where it is put" in printed
     mirrored = "structure.contacts.0.surfaces.body_1.beyond=mirrored"
-    told = invoke("check", blocks, "--set", mirrored).stdout
-    assert "mirrored over 12.5 % of the grid, middle at 0.2 mm, 0 mm" in told
+    reported = invoke("check", blocks, "--set", mirrored).stdout
+    assert "mirrored over 12.5 % of the grid, middle at 0.2 mm, 0 mm" in reported
 
 
 def test_a_scan_on_flat_bodies_is_pressed_as_a_cylinder(tmp_path):
@@ -132,7 +132,7 @@ def test_a_scan_on_flat_bodies_is_pressed_as_a_cylinder(tmp_path):
     """
     steel = Material(200e3, 0.3)
     hertz = HertzCylinder(250.0, 30.0, ElasticPair(steel, steel).contact_modulus)
-    blocks = Blocks((-15, 15), 12, (-6, 6), 10, (-1, 1), strips=512, materials=({}, {}))
+    blocks = Blocks((-15, 15), 12, (-6, 6), 10, (-1, 1), line_contact=512, materials=({}, {}))
     path = blocks.press(tmp_path, 0.2, 250.0)
     x = (np.arange(600) + 0.5) / 600 * 13.0 - 6.5
     np.save(tmp_path / "upper.npy", -(x[:, None] ** 2) / 60.0)
@@ -149,7 +149,9 @@ def test_half_a_face_takes_scans_that_are_their_own_image(tmp_path):
     scan = {**BARE, "pitch": [0.4, 1.0]}
     found = []
     for half, low in ((False, -40), (True, 0)):
-        blocks = Blocks((low, 40), 40, (low // 2, 20), 20, (low // 2, 14), strips=127, half=half)
+        blocks = Blocks(
+            (low, 40), 40, (low // 2, 20), 20, (low // 2, 14), line_contact=127, half=half
+        )
         path = with_surfaces(blocks.press(tmp_path, 1.0, 50.0), body_2={"file": "arc.npy", **scan})
         (face,) = mesh_assembly(load_case(path)).meshed().interfaces
         found.append(dict(zip(np.round(face.coordinates[:, 0], 6), face.gap, strict=True)))
@@ -157,9 +159,9 @@ def test_half_a_face_takes_scans_that_are_their_own_image(tmp_path):
     assert min(part) == 0.0
     for place, gap in part.items():
         assert gap == pytest.approx(whole[place], abs=1e-12)
-    said = refused(with_surfaces(path, body_1={"file": "slope.npy", **scan}))
-    assert "body_1.file: " in said
-    assert "slope.npy: not symmetric about the plane of symmetry across x" in said
+    printed = refused(with_surfaces(path, body_1={"file": "slope.npy", **scan}))
+    assert "body_1.file: " in printed
+    assert "slope.npy: not symmetric about the plane of symmetry across x" in printed
 
 
 @pytest.mark.slow
@@ -167,8 +169,8 @@ def test_a_run_keeps_what_was_measured(blocks, tmp_path):
     """For flat wearing blocks, the unworn lower surface is the scan, and so is the gap."""
     with_surfaces(blocks, body_1={"file": "waves.npy", **SCAN})
     summary = run(blocks, tmp_path / "out")
-    told = summary["surfaces"]["foot"]["body_1"]
-    assert told["lost_by_nodes"] > 0.9 * told["rms_on_grid"]
+    reported = summary["surfaces"]["foot"]["body_1"]
+    assert reported["lost_by_nodes"] > 0.9 * reported["rms_on_grid"]
     for unworn in (["--unworn"], []):
         file = tmp_path / f"lower{len(unworn)}.npz"
         ended = invoke("surface", tmp_path / "out", file, "--body", "1", *unworn)

@@ -99,7 +99,7 @@ TABLE = "wear.disk.evolution={scope: local, energy: [%s], factor: [%s]}"
 
 
 @pytest.mark.parametrize(
-    ("override", "key", "told"),
+    ("override", "key", "reported"),
     [
         ("wear.disk.law=wishful", "wear.disk.law", "not known; allowed: energy, energy_amplitude, "
          "archard"),
@@ -140,9 +140,9 @@ TABLE = "wear.disk.evolution={scope: local, energy: [%s], factor: [%s]}"
          "unknown key; allowed: share, rotation_speed, aerodynamic_moment"),
     ],
 )  # fmt: skip
-def test_wrong_entries_are_told_in_one_line(dovetail_path, override, key, told):
+def test_wrong_entries_are_told_in_one_line(dovetail_path, override, key, reported):
     line = refused(dovetail_path, override)
-    assert told in line, line
+    assert reported in line, line
     assert f"{key}: " in line or line.startswith(f"--set {key}="), line
 
 

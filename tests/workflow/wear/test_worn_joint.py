@@ -110,10 +110,10 @@ def test_a_table_of_loops_that_stick_is_warned_of(tmp_path):
     """Their force over the load is less than the coefficient of friction."""
     table = tmp_path / "loops.csv"
     table.write_text("energy [J],P [N],kt [N/um],mu,sliding\n0,50,40,0.5,1\n5,50,50,0.2,0.4\n")
-    said = []
+    printed = []
     case = SimpleNamespace(
         evolution=SimpleNamespace(file=str(table)), joint=SimpleNamespace(normal_load=50.0)
     )
-    warn_of_table(case, 5e3, SimpleNamespace(warn=said.append))
-    (line,) = said
+    warn_of_table(case, 5e3, SimpleNamespace(warn=printed.append))
+    (line,) = printed
     assert "1 of its 2 loops do not slide as a whole" in line

@@ -162,13 +162,13 @@ class MeasuredLoops:
 
         Raises MeasuredLoopError for loops of several steps.
         """
-        self.require_alike()
+        self.require_one_step()
         compliance = mean_estimate(1.0 / self.stick_stiffness)
         value = 1.0 / compliance.value
         spread = float(self.bend_spread[0])
         return MeanEstimate(value, float(np.hypot(compliance.error * value, spread)) * value)
 
-    def require_alike(self) -> None:
+    def require_one_step(self) -> None:
         """Raise MeasuredLoopError unless all loops belong to one step."""
         if (self.step != self.step[0]).any():
             raise MeasuredLoopError(

@@ -61,5 +61,5 @@ ANALYSIS: Analysis[BodiesCase] = Analysis(
     quantities=main_results,
     curves=CURVES,
     comparison=ChartComparison(quantities=_quantities, at_the_end=AT_THE_END),
-    beside="files",
+    in_worker="files",
 )

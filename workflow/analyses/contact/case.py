@@ -15,14 +15,14 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from sa_solver.types import Array, ElasticPair, Grid
 from sa_solver.types import Material as ElasticMaterial
-from workflow.analyses.contact.doubts import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.load_path import ContactPath, LegsOrFile, LineContactPath
 from workflow.analyses.contact.load_table import PRESSING, LoadTable
+from workflow.analyses.contact.plausibility import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.surfaces import MeasuredSurfaces
-from workflow.case.doubts import heights, hertz, uneven_cells
 from workflow.case.fields import File, Quantity
 from workflow.case.files.input_files import InputFileError, read_heights
 from workflow.case.loading import word_at
+from workflow.case.plausibility import heights, hertz, uneven_cells
 from workflow.case.sections import (
     Case,
     ElasticSection,
@@ -283,7 +283,7 @@ class LineContactGrid(HalfSpaceGrid):
         return self
 
     def centred(self) -> Grid:
-        return Grid.strips(self.size, self.grid[0])
+        return Grid.line_contact(self.size, self.grid[0])
 
 
 # --- cases --------------------------------------------------------------------------------------
@@ -340,7 +340,7 @@ class BodiesCase(Case):
             ("contact", f"{cells}, history {self.contact.history}"),
         ]
 
-    def doubts(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[str]:
         grid, table = self.contact.centred(), self.load_path.table()
         loads = table.columns
         sides = grid.shape[0] * grid.pitch[0], grid.shape[1] * grid.pitch[1]
@@ -355,7 +355,7 @@ class BodiesCase(Case):
             if found := unworn_contact(self.structure, bodies, load, grid.line):
                 yield from about_pressure("load_path", found[1], bodies)
                 yield from about_grid(found[0], sides, grid.shape)
-        yield from surface_doubts(self.structure, grid)
+        yield from surface_warnings(self.structure, grid)
         unit = "N/mm" if grid.line else "N"
         yield from about_shear("load_path", table, self.friction.coefficient, unit)
 
@@ -413,17 +413,17 @@ def check_surfaces(bodies: Bodies, grid: Grid) -> None:
         bodies.surfaces.check(grid)
 
 
-def surface_doubts(bodies: Bodies, grid: Grid) -> Iterator[str]:
+def surface_warnings(bodies: Bodies, grid: Grid) -> Iterator[str]:
     """Warn about the units of measured surfaces, and about roughness that the grid loses."""
     if bodies.surfaces is not None:
-        yield from bodies.surfaces.doubts(grid)
+        yield from bodies.surfaces.plausibility_warnings(grid)
 
 
 def surfaces_in_words(bodies: Bodies, grid: Grid) -> list[tuple[str, str]]:
     """Return an outline row for each measured surface."""
     surfaces = bodies.surfaces
-    told = {} if surfaces is None else surfaces.told(surfaces.summary(grid))
-    return [(f"surface {name[-1]}", text) for name, text in told.items()]
+    reported = {} if surfaces is None else surfaces.reported(surfaces.summary(grid))
+    return [(f"surface {name[-1]}", text) for name, text in reported.items()]
 
 
 def require_shape(file: str, grid: tuple[int, int]) -> None:

@@ -8,7 +8,7 @@ from sa_solver.contact_state import ContactState
 from sa_solver.cycles.history import ContactLoadPath, History, HistoryError, march_history
 from sa_solver.errors import ContactProblemError
 from workflow.analyses.contact.bodies import bodies_of, bulk_strain, half_space_of
-from workflow.analyses.contact.case import BodiesCase, surface_doubts
+from workflow.analyses.contact.case import BodiesCase, surface_warnings
 from workflow.analyses.contact.output.results import (
     ContactOutcome,
     ContactRun,
@@ -47,19 +47,19 @@ def _march(
 ) -> tuple[ContactOutcome, str]:
     """Return the outcome of the path, and a message on why it ended early; empty if it did not."""
     grid, table = case.contact.centred(), case.load_path.table()
-    for doubt in surface_doubts(case.structure, grid):
-        reporter.warn(doubt)
+    for warning in surface_warnings(case.structure, grid):
+        reporter.warn(warning)
     height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
     strain = bulk_strain(table, bodies_of(case))
     passed: dict[int, ContactState] = {}
-    spent: list[int] = []
+    cost: list[int] = []
     with reporter.course("contact"), reporter.stage("contact"):
 
         def keep(row: int, state: ContactState, share: float) -> None:
             if row in passed:
                 passed.clear()  # the path is followed anew, in shorter increments
             passed[row] = state
-            spent.append(state.convolutions)
+            cost.append(state.convolutions)
             reporter.reached(share, f"increment {row + 1} of {len(table)}")
             reporter.log(
                 f"increment {row + 1}: residual {state.residual:.1e}, "
@@ -87,7 +87,7 @@ def _march(
             last, row = history.states[-1], history.indices[-1] + 1
             message = f"increment {row} of {len(table)} did not converge: {last.message}"
             message = "" if last.converged else message
-    return ContactOutcome(case, grid, height, table, strain, history, sum(spent)), message
+    return ContactOutcome(case, grid, height, table, strain, history, sum(cost)), message
 
 
 def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:

@@ -212,14 +212,14 @@ class SurfacesOfTwo(Section):
             }
         return numbers
 
-    def told(self, summary: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    def reported(self, summary: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
         """Return the numbers of each surface as one line of text, by body."""
         return {
             name: f"{_in_words(numbers)}{self.bodies[name].place}"
             for name, numbers in summary.items()
         }
 
-    def doubts(self, grid: Grid, key: str = KEY) -> Iterator[str]:
+    def plausibility_warnings(self, grid: Grid, key: str = KEY) -> Iterator[str]:
         """Warn about units, and about grids that lose the roughness."""
         for name, numbers in self.summary(grid).items():
             height = numbers["rms"]

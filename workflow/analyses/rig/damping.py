@@ -9,13 +9,15 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from workflow.analyses.rig.places import NAMED, Against, Direction
-from workflow.case.fields import OrAlone, Quantity
+from workflow.case.fields import Quantity, ScalarOrList
 from workflow.case.sections import Section, Title, disagreement, entry
 from workflow.case.text.plain import counted, shares
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual rig.
 DampingRatio = Annotated[float, Quantity("1", at_least=0.0, below=1.0)]
-DampingRatios = Annotated[tuple[DampingRatio, ...], OrAlone(), Field(min_length=1, max_length=999)]
+DampingRatios = Annotated[
+    tuple[DampingRatio, ...], ScalarOrList(), Field(min_length=1, max_length=999)
+]
 OF_MODES = (
     "damping ratio of every mode; or a list from the lowest mode on, rigid motions included, "
     "whose last value holds for all further modes [1]"

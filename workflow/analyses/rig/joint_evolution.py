@@ -136,8 +136,10 @@ class EvolutionSection(Section):
         if self.file is not None:
             return f"friction and stiffness of {Path(self.file).name}"
         given = {name: getattr(self, name) for name in type(self).model_fields if name != "file"}
-        told = (f"{name.replace('_', ' ')} {f.kind}" for name, f in given.items() if f is not None)
-        return ", ".join(told) or "none"
+        reported = (
+            f"{name.replace('_', ' ')} {f.kind}" for name, f in given.items() if f is not None
+        )
+        return ", ".join(reported) or "none"
 
     @property
     def is_empty(self) -> bool:

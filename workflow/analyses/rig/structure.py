@@ -89,7 +89,7 @@ class RowOfMasses(Section):
     damping: Damping | None = entry("damping added to that of the modes", default=None)
 
     @model_validator(mode="after")
-    def _damps_its_own(self) -> RowOfMasses:
+    def _check_damping_ratios(self) -> RowOfMasses:
         count = len(self.masses)
         if len(self.damping_ratio) > count:
             raise disagreement(
@@ -125,7 +125,7 @@ class Rig(RowOfMasses):
     )
 
     @model_validator(mode="after")
-    def _joins_its_own(self) -> Rig:
+    def _check_joint_places(self) -> Rig:
         names = [f"m{number}" for number in range(1, len(self.masses) + 1)]
         for number, joint in enumerate(self.joints):
             key = f"joints.{number}"

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from sa_solver.types import Grid
 from sa_solver.types import Material as ElasticMaterial
 from wear.laws import WearLaw
-from workflow.analyses.contact.doubts import about_pressure
+from workflow.analyses.contact.plausibility import about_pressure
 from workflow.analyses.contact.surfaces import KEY, MeasuredSurfaces
 from workflow.analyses.wear.case.evolution import PositiveEnergy
 from workflow.analyses.wear.case.scanned import ScannedFace, WithScans
@@ -318,7 +318,7 @@ class SpecimensCase(WithScans, Case):
             ("wear", f"{end}{' each' * several}, in cycle blocks of {block}"),
         ]
 
-    def doubts(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[str]:
         side = self.structure.strip_width
         if self.load_path.stroke > side:
             yield (
@@ -329,7 +329,7 @@ class SpecimensCase(WithScans, Case):
         for index, force in enumerate(self.load_path.normal_forces):
             path = f"load_path.normal_forces.{index}"
             yield from about_pressure(path, force / side**2, bodies)
-        yield from self.surface_doubts()
+        yield from self.surface_warnings()
 
     @model_validator(mode="after")
     def _surfaces_fit(self) -> SpecimensCase:

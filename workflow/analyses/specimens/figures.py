@@ -163,8 +163,8 @@ def kinetics(file: h5py.File) -> Figure:
         over_cycles.plot(cycles, stiffness, **look)
         over_cycles.plot([state.attrs["cycles"] for state in kept], slopes, "o--", **dots)
         over_energy.plot(energy, stiffness, **look)
-        spent = [TO_JOULES * state.attrs["energy"] for state in kept]
-        over_energy.plot(spent, slopes, "o--", **dots)
+        cost = [TO_JOULES * state.attrs["energy"] for state in kept]
+        over_energy.plot(cost, slopes, "o--", **dots)
         areas.plot(cycles, history["area"][1:], label=_force(load), **look)
         pressures.plot(cycles, 100.0 * history["pressure_deviation"][1:], **look)
     _label_kinetics(panels)

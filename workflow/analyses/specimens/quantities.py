@@ -9,7 +9,7 @@ from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.wear.output.layout import MOMENTS
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
-from workflow.shell.output.summary import estimate, told
+from workflow.shell.output.summary import estimate, reported
 
 FREE = "free specimens"
 UNCOUPLED = "difference to a cycle with pressure and shear coupled"
@@ -46,7 +46,7 @@ def main_results(case: SpecimensCase, summary: Summary) -> list[SummaryQuantity]
         )
         for n in (1, 2)
     ]
-    return told(summary, quantities)
+    return reported(summary, quantities)
 
 
 def _under(group: str, number: int, summary: Summary) -> Iterator[SummaryQuantity]:

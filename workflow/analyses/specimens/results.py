@@ -15,7 +15,7 @@ from fe_models.matrices import write_matrices
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.layout import LAYOUT, PAD
-from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
+from workflow.analyses.specimens.outcome import LoadOutcome, SpecimensOutcome, StoredState
 from workflow.analyses.specimens.summary import (
     SLOPE_SHARE,
     collapse,
@@ -124,7 +124,7 @@ def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Array]:
     }
 
 
-def _state(kept: KeptState, areas: Array) -> dict[str, Array]:
+def _state(kept: StoredState, areas: Array) -> dict[str, Array]:
     """Return fields of the pad in a worn state, at its nodes."""
     block, contact = kept.block, kept.block.contact
     worn_1, worn_2 = block.depths
@@ -154,7 +154,7 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
     coefficients = wear.body_1.rate(1.0), wear.body_2.rate(1.0)  # reports need laws of energy
     return {
         "structure": {"nodes": model.node_count(), "pad_nodes": len(model.face)},
-        **model.case.told_surfaces(),
+        **model.case.surfaces_summary(),
         "frequencies": frequencies(outcome),
         "tied_pad": tied_pad(outcome.bulk),
         "explanation": explanation(outcome),

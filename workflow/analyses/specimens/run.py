@@ -27,10 +27,10 @@ from workflow.analyses.specimens.half_space import HalfSpaceState, PadHalfSpace,
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
 from workflow.analyses.specimens.outcome import (
-    KeptState,
     LoadOutcome,
     MarchedCycle,
     SpecimensOutcome,
+    StoredState,
 )
 from workflow.analyses.specimens.results import write_specimens_output
 from workflow.analyses.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
@@ -38,12 +38,12 @@ from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.analysis import Run
 from workflow.shell.few_cells import check_cells
-from workflow.shell.folders.steps import kept_steps
+from workflow.shell.folders.steps import resumable_steps
 from workflow.shell.terminal.reporter import Reporter
 
 # Number of states of each force that are stored with their fields: the unworn one, the last, and
 # others evenly spaced in the logarithm of the cycles.
-KEPT_STATES = 13
+MOST_STORED_STATES = 13
 # Points of first loading, denser at its beginning (a power of even steps).
 CURVE_POINTS, CURVE_POWER = 61, 2.0
 HALF_SPACE_POINTS = 13
@@ -79,7 +79,7 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
     contact does not converge.
     """
     try:
-        with kept_steps(run) as steps:
+        with resumable_steps(run) as steps:
             outcome = _compute(run.case, run.reporter, steps)
     except MeshError as error:
         raise UserError(f"{run.folder.case}: {error}") from error
@@ -89,16 +89,16 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
 
 
 def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> SpecimensOutcome:
-    for doubt in case.surface_doubts():
-        reporter.warn(doubt)
+    for warning in case.surface_warnings():
+        reporter.warn(warning)
     model = SpecimensModel(case)
     with reporter.stage("mesh"):
         nodes = model.node_count()
     for finer in case.finer_than_nodes(FINER):
         reporter.say(finer)
     memory(case, nodes).check()
-    with reporter.stage("reduction", "steps") as told:
-        model.prepare(told)
+    with reporter.stage("reduction", "steps") as reported:
+        model.prepare(reported)
         pair = model.pair
     if model.from_cache:
         reporter.log("reduction: from the cache")
@@ -135,7 +135,7 @@ def _fret(
             steps("first loading", partial(first_loading, pair, state, conditions))
             for state in _chosen(blocks)
         )
-        kept = tuple(map(KeptState, _chosen(blocks), curves))
+        kept = tuple(map(StoredState, _chosen(blocks), curves))
     grid = half_space.grid
     height = model.gap(grid)
     path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)
@@ -250,10 +250,10 @@ def _check(state: BlockState, conditions: FrettingConditions, case: SpecimensCas
 
 def _chosen(blocks: tuple[BlockState, ...]) -> list[BlockState]:
     """Return the states to store with their fields."""
-    if len(blocks) <= KEPT_STATES:
+    if len(blocks) <= MOST_STORED_STATES:
         return list(blocks)
     cycles = np.array([state.cycles for state in blocks])
-    wanted = np.geomspace(cycles[1], cycles[-1], KEPT_STATES - 1)
+    wanted = np.geomspace(cycles[1], cycles[-1], MOST_STORED_STATES - 1)
     places = np.unique([0, *(int(np.abs(cycles - value).argmin()) for value in wanted)])
     return [blocks[place] for place in places]
 

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from workflow.analyses.rig.bodies.matrix_body import MatrixBody
-from workflow.analyses.rig.doubts import AWAY, RIGID, about_matrices, about_modes
 from workflow.analyses.rig.excitation import (
     Excitation,
     Hammer,
@@ -27,6 +26,7 @@ from workflow.analyses.rig.joint_sections import (
     Joint,
     JointLaw,
 )
+from workflow.analyses.rig.plausibility import AWAY, RIGID, about_matrices, about_modes
 from workflow.analyses.rig.structure import (
     ReducedBody,
     Rig,
@@ -213,7 +213,7 @@ class RigCase(TimeCase):
         return self
 
     @model_validator(mode="after")
-    def _leaves_a_joint(self) -> RigCase:
+    def _check_joint_is_used(self) -> RigCase:
         if None not in own_laws(self.structure):
             raise disagreement(
                 f"{self.joint.law}: not used, because every entry of joints has a law of its own; "
@@ -278,7 +278,7 @@ class RigCase(TimeCase):
     @property
     def steps(self) -> float:
         """Number of time steps stored of each motion."""
-        return _kept_time(self.excitation) / self.integration.step
+        return _recorded_time(self.excitation) / self.integration.step
 
     def outline(self) -> list[tuple[str, str]]:
         structure = self.structure
@@ -292,7 +292,7 @@ class RigCase(TimeCase):
             rows.append(("ageing", ageing_outline(self.ageing)))
         return rows
 
-    def doubts(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[str]:
         excitation, own = self.excitation, own_laws(self.structure)
         stiffness = RIGID if any(own) else self.joint.stiffness
         if isinstance(excitation, Harmonic):
@@ -319,7 +319,7 @@ def _longest_step(excitation: Harmonic | Hammer | Recorded) -> float:
     return float(np.diff(excitation.read()[0]).min())
 
 
-def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
+def _recorded_time(excitation: Harmonic | Hammer | Recorded) -> float:
     """Return the length of the stored motion [s]."""
     if isinstance(excitation, Harmonic):
         return 1.0 / excitation.frequency

@@ -10,7 +10,7 @@ from workflow.analyses.time.case import JointCase, RigCase, joules
 from workflow.analyses.time.outcome import PARAMETERS
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
-from workflow.shell.output.summary import estimate, told
+from workflow.shell.output.summary import estimate, reported
 
 AGEING, IN_TIME = "jumps in energy, a bound", "displacement, due to the time steps"
 STEADY = "intervals between steady states"
@@ -60,7 +60,7 @@ def main_results(case: JointCase | RigCase, summary: Summary) -> list[SummaryQua
         for quantity in _of_state(number, _when(number, summary), summary)
     )
     rig = SummaryQuantity("rig without its joints", "first natural frequency", "free.0", "Hz")
-    return told(summary, [*whole, *states, rig])
+    return reported(summary, [*whole, *states, rig])
 
 
 def _of_ageing(summary: Summary) -> dict[str, Any]:

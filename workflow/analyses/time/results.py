@@ -83,10 +83,10 @@ def _lines(summary: dict[str, Any], case: TimeCase) -> Iterator[str]:
     """Yield lines on the results, for the end of the run."""
     for state in summary["states"]:
         yield f"  {_state_line(state)}"
-    for entry, told in zip(summary["reported"], case.reported, strict=True):
+    for entry, messages in zip(summary["reported"], case.reported, strict=True):
         yield (
-            f"  {entry['quantity']}: {_shown(entry['computed'], told.value)} computed, "
-            f"{_shown(entry['reported'], told.value)} reported ({entry['source']})"
+            f"  {entry['quantity']}: {_shown(entry['computed'], messages.value)} computed, "
+            f"{_shown(entry['reported'], messages.value)} reported ({entry['source']})"
         )
 
 

@@ -10,7 +10,7 @@ from workflow.analyses.time.rig import run_rig
 from workflow.analyses.time.worn_joint import warn_of_table, with_computed_wear
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
-from workflow.shell.folders.steps import kept_steps
+from workflow.shell.folders.steps import resumable_steps
 
 
 def run_time(run: Run[JointCase | RigCase]) -> None:
@@ -22,7 +22,7 @@ def run_time(run: Run[JointCase | RigCase]) -> None:
     folder, reporter = run.folder, run.reporter
     case = with_computed_wear(run)
     try:
-        with kept_steps(run) as steps:
+        with resumable_steps(run) as steps:
             if isinstance(case, JointCase):
                 outcome = run_joint(case, reporter, steps)
             else:

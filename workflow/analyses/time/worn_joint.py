@@ -36,9 +36,9 @@ def with_computed_wear(run: Run[JointCase | RigCase]) -> JointCase | RigCase:
         run.reporter.say(f"wear of the contact: taken from the earlier run in {folder}")
     summary = OutputFolder(folder).read_summary()
     tables = {
-        name: folder / told["loops"]["file"]
-        for name, told in summary.items()
-        if isinstance(told, dict) and "loops" in told
+        name: folder / reported["loops"]["file"]
+        for name, reported in summary.items()
+        if isinstance(reported, dict) and "loops" in reported
     }
     if len(tables) != 1:
         raise UserError(

@@ -43,11 +43,11 @@ def answers_under(
     if not case.at:
         return None, {}
     force, accuracy, control = branch.solutions[0].force, accuracy_of(case), step_control(case)
-    told = case.amount.told(force)
+    reported = case.amount.as_text(force)
     every: list[HarmonicSolution] = []
     numbers: list[dict[str, Any]] = []
     for frequency in case.at:
-        reporter.doing(f"{told}: motions at {frequency:g} Hz")
+        reporter.doing(f"{reported}: motions at {frequency:g} Hz")
         found = motions_at(branch, frequency, control, steps)
         motions = [
             steps("accurate motion", partial(_accurate, branch, motion, accuracy))
@@ -56,10 +56,10 @@ def answers_under(
         ]
         message = _message(branch, frequency, found)
         if message:
-            reporter.warn(f"{told} at {frequency:g} Hz: {message}")
+            reporter.warn(f"{reported} at {frequency:g} Hz: {message}")
         those = [_numbers(model, branch, motion) for motion in motions]
         for motion in those:
-            named = f"{told}: the motion at {frequency:g} Hz"
+            named = f"{reported}: the motion at {frequency:g} Hz"
             warn_of_error(named, motion["error"], case, reporter)
         numbers.append({"frequency": frequency, "motions": those, "message": message})
         every += motions
@@ -78,7 +78,7 @@ def _accurate(
     The motion is not refined where added harmonics lead to another motion.
     """
     found = accurate(branch.problem, motion, accuracy)
-    problem = branch.problem.refined(found.resolution)
+    problem = branch.problem.with_resolution(found.resolution)
     before = problem.resolution.adopt(motion.coefficients, motion.resolution)
     size = problem.vibration(found.coefficients)
     if problem.vibration(found.coefficients - before) <= ANOTHER * size:

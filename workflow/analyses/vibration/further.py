@@ -39,7 +39,7 @@ def further_from(
 
     A start that leads to no other branch gives a warning.
     """
-    name = f"{case.amount.told(start.force)}, from {start.frequency:g} Hz"
+    name = f"{case.amount.as_text(start.force)}, from {start.frequency:g} Hz"
     problem = max((branch.problem for branch in known), key=lambda of: of.resolution.samples)
     control = step_control(case, progress_along(case.frequencies, True, "Hz", reporter))
     starts = vibrating_starts(problem, start.frequency, start.amplitude, model.rig.seen[-1])

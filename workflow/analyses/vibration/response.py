@@ -83,16 +83,16 @@ def response_under(
     Raises MethodFailed where there is no motion at all. A curve that ends before its span does
     gives a warning.
     """
-    sweep, told = sweep_of(case), case.amount.told(force)
+    sweep, reported = sweep_of(case), case.amount.as_text(force)
     watch = progress_along(sweep.span, sweep.upward, "Hz", reporter)
     branch = sweep.curve(model, force, steps, watch)
     if branch.message:
         unbounded = UNBOUNDED if model.undamped else ""
-        reporter.warn(f"{told}: {branch.message}{unbounded}")
+        reporter.warn(f"{reported}: {branch.message}{unbounded}")
     stability = stability_along(
         case,
         model,
-        told,
+        reported,
         curve_by_frequency(branch.problem, force),
         branch.solutions,
         partial(amplitude_of, model),
@@ -101,11 +101,11 @@ def response_under(
     )
     curves = {**curves_of(case, model, branch), **stability.columns}
     if int(np.argmax(curves["amplitude"][:, -1])) in (0, len(branch.solutions) - 1):
-        reporter.warn(f"{told}: no resonance, the largest motion is at an end of the curve")
-    reporter.doing(f"{told}: resonance")
+        reporter.warn(f"{reported}: no resonance, the largest motion is at an end of the curve")
+    reporter.doing(f"{reported}: resonance")
     resonance = sweep.resonance(model, branch, curves["amplitude"][:, -1], steps)
-    warn_of_stroke(model, f"{told}: at resonance", resonance, reporter)
-    found = branch.problem.refined(resonance.resolution)
+    warn_of_stroke(model, f"{reported}: at resonance", resonance, reporter)
+    found = branch.problem.with_resolution(resonance.resolution)
     response = Response(
         force,
         curves,
@@ -116,7 +116,7 @@ def response_under(
         harmonics={RESONANCE: harmonics_of(model.rig, resonance)},
         bifurcations=stability.bifurcations,
     )
-    warn_of_error(f"{told}: the motion", response.numbers["error"], case, reporter)
+    warn_of_error(f"{reported}: the motion", response.numbers["error"], case, reporter)
     return response, branch
 
 
@@ -292,7 +292,7 @@ def _cycle(solution: HarmonicSolution) -> Arrays:
 
 
 def warn_of_stroke(
-    model: VibratingStructure, told: str, motion: HarmonicSolution, reporter: Reporter
+    model: VibratingStructure, reported: str, motion: HarmonicSolution, reporter: Reporter
 ) -> None:
     """Warn if contacts with places slide further than contacts of fixed pairs of nodes may."""
     if not len(model.rig.places):
@@ -304,6 +304,6 @@ def warn_of_stroke(
     )
     if stroke > LARGE_STROKE * width:
         reporter.warn(
-            f"{told} the pads slide over each other by {stroke:.3g} mm, more than "
+            f"{reported} the pads slide over each other by {stroke:.3g} mm, more than "
             f"{shares(LARGE_STROKE)} of their width: the result neglects that other nodes then meet"
         )

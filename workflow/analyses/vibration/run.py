@@ -37,7 +37,7 @@ from workflow.case.text.readable import percent
 from workflow.errors import UserError
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.analysis import Run
-from workflow.shell.folders.steps import kept_steps
+from workflow.shell.folders.steps import resumable_steps
 from workflow.shell.terminal.reporter import Reporter
 
 # Share of a record's force above its highest harmonic that gives a warning.
@@ -52,7 +52,7 @@ def run_vibration(run: Run[VibrationCase]) -> None:
     warning.
     """
     try:
-        with kept_steps(run) as steps:
+        with resumable_steps(run) as steps:
             outcome = _outcome(run.case, run.reporter, steps)
     except JointError as error:
         raise UserError(f"{run.folder.case}: joint: {error}") from error
@@ -65,7 +65,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     model = vibration_model(case, reporter).structure
     with reporter.stage("rest and linear limits"):
         numbers, contact = structure_numbers(model), contact_at_rest(model)
-        _tell_what_is_left_out(case, model, reporter)
+        _report_omissions(case, model, reporter)
         by_diameters = diameters(model)
         refuse_missing_modes(case, model)
         linear = steps("linear limits", lambda: model.linear(case.frequencies))
@@ -79,7 +79,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     curves = _Curves(count, reporter, growing=case.resolution.tolerance is not None)
     with reporter.course("vibration"):
         for force in case.amounts:
-            with curves.next(case.amount.told(force)), reporter.stage("response"):
+            with curves.next(case.amount.as_text(force)), reporter.stage("response"):
                 response, branch = response_under(case, model, force, reporter, steps)
                 answers, of_answers = answers_under(case, model, branch, reporter, steps)
                 harmonics = {**response.harmonics, **of_answers}
@@ -120,9 +120,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     )
 
 
-def _tell_what_is_left_out(
-    case: VibrationCase, model: VibratingStructure, reporter: Reporter
-) -> None:
+def _report_omissions(case: VibrationCase, model: VibratingStructure, reporter: Reporter) -> None:
     """Report the parts of records that are left out, and stability that is not computed."""
     for number, share in enumerate(model.driving.left_out):
         reporter.log(

@@ -49,7 +49,7 @@ NOT_LOOKED_FOR = CurveStability({}, {}, ())
 def looked_for(case: VibrationCase, model: VibratingStructure) -> bool:
     """Return whether stability is computed: as the case says, or else where it is cheap."""
     if case.stability == "auto":
-        return Floquet(model.problem).cheap
+        return Floquet(model.problem).is_fast
     return case.stability == "every"
 
 

@@ -68,7 +68,7 @@ def on_plane(nodes: JointNodes) -> Array:
 
     Empty ``(0, 2)`` where the places are not known, or there are several normals.
     """
-    if nodes.places is None or not nodes.alike:
+    if nodes.places is None or not nodes.same_normal:
         return np.empty((0, 2))
     across = np.flatnonzero(nodes.normals[0] == 0.0)
     places = nodes.places[:, across]

@@ -11,10 +11,10 @@ from pydantic import Field, StrictBool, model_validator
 
 from wear.laws import WearLaw
 from workflow.analyses.rig.bodies.matrix_body import MatrixBody
-from workflow.analyses.rig.doubts import AWAY, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency
 from workflow.analyses.rig.joint_sections import FrictionContactJoint, JenkinsJoint, Joint
 from workflow.analyses.rig.place_names import place_names_of
+from workflow.analyses.rig.plausibility import AWAY, about_modes
 from workflow.analyses.rig.structure import (
     FrictionRig,
     ReducedBody,
@@ -200,14 +200,14 @@ class VibrationWearCaseBase(VibrationCaseBase):
         structure, wear = self.structure, self.wear
         return [
             *structure_outline(structure),
-            ("worn by", f"{self.amount.told(self.wearing)} {wear.where}"),
+            ("worn by", f"{self.amount.as_text(self.wearing)} {wear.where}"),
             ("states", f"unworn and after {'; '.join(map(times, wear.cycles))} cycles"),
             ("forces", self.driving),
             ("method", self.resolved),
         ]
 
-    def doubts(self) -> Iterator[str]:
-        yield from super().doubts()
+    def plausibility_warnings(self) -> Iterator[str]:
+        yield from super().plausibility_warnings()
         frequency: float | None = self.wear.frequency
         if frequency is not None:
             span = frequency / AWAY, frequency * AWAY

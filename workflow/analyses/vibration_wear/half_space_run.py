@@ -63,7 +63,7 @@ def wear_half_space(
     resolution = Resolution(case.harmonics, case.resolution.samples)
     driving = driving_of(case.excitation, rig, case.resolution.harmonics[-1])
     contact = VibratingContact(bodies, rig, driving, case.wearing, wear.frequency, resolution)
-    stepper = SubcyclingStepper(wear_of(bodies).stepper(), contact.alike_cycles, steps)
+    stepper = SubcyclingStepper(wear_of(bodies).stepper(), contact.steady_friction_cycles, steps)
     with reporter.stage("contact, first cycle"):
         state = contact.unworn()
         first = first_cycles(contact.wearing(state), state, wear.cycles[-1])

@@ -15,7 +15,7 @@ from workflow.analyses.vibration_wear.output.results import (
     write_vibration_wear_output,
 )
 from workflow.errors import MethodFailed, UserError
-from workflow.shell.folders.steps import kept_steps
+from workflow.shell.folders.steps import resumable_steps
 
 
 def run_vibration_wear(run: VibrationWearRun) -> None:
@@ -26,7 +26,7 @@ def run_vibration_wear(run: VibrationWearRun) -> None:
     """
     case, reporter = run.case, run.reporter
     try:
-        with kept_steps(run) as steps:
+        with resumable_steps(run) as steps:
             if isinstance(case, VibrationWearCase):
                 outcome = wear_half_space(case, reporter, steps)
             else:

@@ -83,7 +83,7 @@ def worn_states(
     with reporter.course("vibration and wear"):
         parts = reporter.parts((0.0, *numbers), lambda cycles: f"{cycles:.4g} cycles")
         for cycles, worn in zip(parts, chain([begun], loop.march(begun)), strict=True):
-            count, before = worn.spent.steps - before, worn.spent.steps
+            count, before = worn.cost.steps - before, worn.cost.steps
             name = "worn state" if count else "unworn state"
             with reporter.part(WEAR if count else 0.0, 1.0):
                 (contact_state,) = worn.interfaces
@@ -99,11 +99,11 @@ def responses_to_all(
     steps: Steps,
 ) -> tuple[float, tuple[Response, ...]]:
     """Return the error of the ``motion`` that wears, and the responses to each force."""
-    error = resolution_error(model.problem.refined(motion.resolution), motion).largest
+    error = resolution_error(model.problem.with_resolution(motion.resolution), motion).largest
     warn_of_error("the motion that wears", error, case, reporter)
     with reporter.stage("response"):
         responses = [
             response_under(case, model, force, reporter, steps)[0]
-            for force in reporter.parts(case.amounts, case.amount.told)
+            for force in reporter.parts(case.amounts, case.amount.as_text)
         ]
     return error, tuple(responses)

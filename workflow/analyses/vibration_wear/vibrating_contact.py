@@ -131,7 +131,7 @@ class VibratingContact:
         """Return the contact in a state in the form that wear steps need."""
         return self.at(state).wearing
 
-    def alike_cycles(self, state: WearState, most: float) -> float:
+    def steady_friction_cycles(self, state: WearState, most: float) -> float:
         """Return the number of cycles, at most ``most``, in which friction hardly changes; or 1.
 
         A wear step uses the friction at its beginning.

@@ -11,7 +11,7 @@ from sa_solver.types import Tally
 from wear.contact.contacts import Contacts
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
-from wear.worn import Spent
+from wear.worn import Cost
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.translation import face_contact
 from workflow.models.contact import ContactEnd, FaceContact
@@ -62,7 +62,7 @@ class ContactProcesses(FaceContacts):
 
     def jump(
         self, states: Sequence[InterfaceState], cycles: float, left: float
-    ) -> list[tuple[InterfaceState, Spent]]:
+    ) -> list[tuple[InterfaceState, Cost]]:
         return self._counted("jump", states, self.each(cycles), self.each(left))
 
     def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
@@ -75,10 +75,10 @@ class ContactProcesses(FaceContacts):
         """Return the workers' answers; the increments of a call are the next call's estimate."""
         progress = self._progress
 
-        def told(done: int, expected: int) -> None:
+        def reported(done: int, expected: int) -> None:
             progress(done, max(done, expected))
 
-        solved = Tally(told, self._expected)
+        solved = Tally(reported, self._expected)
         answers = self._team.call(method, *arguments, done=solved)
         self._expected = max(solved.done, 1)
         return answers

@@ -17,8 +17,8 @@ from workflow.analyses.wear.checks.warnings import (
     warn_of_instability,
     warn_of_many_jumps,
 )
-from workflow.analyses.wear.worn.bolts import kept_tensions
-from workflow.analyses.wear.worn.contact_loops import kept_loops
+from workflow.analyses.wear.worn.bolts import stored_tensions
+from workflow.analyses.wear.worn.contact_loops import stored_loops
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
 from workflow.models.contacts import FaceContacts
@@ -39,9 +39,9 @@ def reported_stage(reporter: Reporter, working: object, name: str, of: str) -> I
     ``of`` names the items. Objects that report no progress, such as other sources of loads, have no
     long computations.
     """
-    with reporter.stage(name, of) as told, ExitStack() as stack:
+    with reporter.stage(name, of) as reported, ExitStack() as stack:
         if isinstance(working, ReportsProgress):
-            stack.enter_context(working.reporting_to(told))
+            stack.enter_context(working.reporting_to(reported))
         yield
 
 
@@ -57,22 +57,22 @@ class RunLog(Observer):
         working = self.source if name == "structural friction" else self.contacts
         return reported_stage(self.run.reporter, working, name, "increments")
 
-    def jumping(self, state: CoupledState, cycles: float) -> None:
+    def jump_started(self, state: CoupledState, cycles: float) -> None:
         step = self.run.case.wear.step
         if step.kind == "explicit" and step.fraction is None:
             warn_of_instability(self.contacts.stages, state, cycles, self.run.reporter)
 
-    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+    def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
         if self.run.case.contact.method != "nodes":
             warn_of_growth(self.contacts.stages, after, self.run.reporter)
-        drift, spent = after.drift[-1], after.spent - before.spent
+        drift, cost = after.drift[-1], after.cost - before.cost
         if after.solutions > before.solutions:
             self.run.reporter.log(f"drift {percent(drift)}: loads computed again")
         depths = ", ".join(f"{depth * 1e3:.3f}" for depth in after.kinetics[-1, :, :2].ravel())
         self.run.reporter.log(
             f"jump {after.jump}: {after.cycles[-1]:.6g} cycles, depths {depths} um, "
-            f"{counted(spent.steps, 'step')}, {counted(spent.contact_solves, 'contact problem')}, "
-            f"{spent.convolutions} convolutions, drift {percent(drift)}"
+            f"{counted(cost.steps, 'step')}, {counted(cost.contact_solves, 'contact problem')}, "
+            f"{cost.convolutions} convolutions, drift {percent(drift)}"
         )
 
     def remaining(self, state: CoupledState, jumps: int) -> None:
@@ -98,7 +98,7 @@ class FileRecorder(Observer):
         if self.run.kept is None:
             self.record(state)
 
-    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+    def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
         self.record(after)
 
     def record(self, state: CoupledState) -> None:
@@ -113,7 +113,7 @@ class FileRecorder(Observer):
                 for body, height in enumerate(stage.on_grid(interface).heights, start=1):
                     arrays[f"surfaces/{name}/body_{body}"] = height
                 arrays |= {f"contact/{name}/{k}": field for k, field in vars(fields).items()}
-            arrays |= loops | kept_tensions(self.source, state)
+            arrays |= loops | stored_tensions(self.source, state)
             self.steps.record(state.jump, arrays, {"cycles": float(state.cycles[-1])})
 
     def _loops(self, state: CoupledState) -> dict[str, Array]:
@@ -123,4 +123,4 @@ class FileRecorder(Observer):
             return {}
         with self.run.reporter.stage("tangential loops"):
             found = self.contacts.loops(state.interfaces, self.peak, loops)
-        return kept_loops(self.contacts.names, found)
+        return stored_loops(self.contacts.names, found)

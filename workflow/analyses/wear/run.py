@@ -44,7 +44,7 @@ from workflow.models.structure import StructureLoads
 from workflow.models.wear import WearModel
 from workflow.shell.analysis import Run
 from workflow.shell.folders.cache import DiskStore
-from workflow.shell.folders.steps import RunSteps, kept_steps
+from workflow.shell.folders.steps import RunSteps, resumable_steps
 from workflow.shell.processes import Workers
 from workflow.shell.terminal.reporter import Reporter
 
@@ -55,7 +55,7 @@ def run_wear(run: Run[WearCase]) -> None:
     report_choice(run.choice, run.reporter, again=run.resume)
     try:
         with ExitStack() as working:
-            with kept_steps(run) as steps:
+            with resumable_steps(run) as steps:
                 outcome, probe_results = _compute(run, working, steps)
             with one_thread():
                 write_output(outcome, probe_results, run)
@@ -81,19 +81,19 @@ def _compute(
     ``working`` keeps the workers until these results are in.
     """
     case, reporter = run.case, run.reporter
-    for doubt in case.surface_doubts():
-        reporter.warn(doubt)
+    for warning in case.surface_warnings():
+        reporter.warn(warning)
     model = wear_model(case)
     source = model.loads(DiskStore())
     faces = meshed_faces(case, source, reporter)
     for face in faces:
         check_section(case, face)
     workers = working.enter_context(
-        contact_workers(case, faces if _worn_apart(case, source) else ())
+        contact_workers(case, faces if _wears_in_workers(case, source) else ())
     )
     with reported_stage(reporter, source, "condensation", "steps"):
         source.prepare()
-    probe_results = begin_probe_runs(case, source, run.beside)
+    probe_results = begin_probe_runs(case, source, run.worker)
     with one_thread():
         with reported_stage(reporter, source, "structural friction", "increments"):
             unworn = source.unworn()
@@ -105,7 +105,7 @@ def _compute(
         with reporter.stage("contact set-up"):
             contacts = _contacts(case, model, source, workers)
         state, first = _march(run, model, source, contacts, unworn, steps)
-        ends = _told_once(contacts.ends(state.interfaces), working, len(faces))
+        ends = _last_cycles(contacts.ends(state.interfaces), working, len(faces))
     columns = contacts.stages, unworn, first, state.interfaces, ends
     finer = partial(structure_of(case).finer_cycles, case)
     interfaces = [
@@ -115,7 +115,7 @@ def _compute(
     return Outcome(case, source, state, interfaces), probe_results
 
 
-def _told_once(
+def _last_cycles(
     answers: Callable[[], list[ContactEnd]], working: ExitStack, contacts: int
 ) -> list[Callable[[], ContactEnd]]:
     """Return one function per contact for its last cycle, safe to call from any thread.
@@ -124,13 +124,13 @@ def _told_once(
     """
 
     @cache
-    def told() -> list[ContactEnd]:
+    def reported() -> list[ContactEnd]:
         with working:  # keeps the workers until then
             return answers()
 
     def tell(number: int) -> ContactEnd:
         with asking:
-            return told()[number]
+            return reported()[number]
 
     asking = Lock()
     return [partial(tell, number) for number in range(contacts)]
@@ -141,12 +141,12 @@ def _contacts(
 ) -> FaceContacts:
     """Return the contacts: half-spaces in worker processes or here, or nodes of the structure."""
     contacts = model.face_contacts(source)
-    if _worn_apart(case, source):
+    if _wears_in_workers(case, source):
         return ContactProcesses(contacts.stages, workers)
     return contacts
 
 
-def _worn_apart(case: WearCase, source: LoadSource) -> bool:
+def _wears_in_workers(case: WearCase, source: LoadSource) -> bool:
     """Return whether contacts wear in workers; line contacts are faster than starting workers."""
     method = case.contact.method
     return method == "full" or (method == "normal" and not source.line)

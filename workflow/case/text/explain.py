@@ -110,8 +110,8 @@ class Explanation:
         if field is None:
             return ""
         if field.examples:
-            told = "such as" in (field.description or "")
-            return "" if told else f", such as {scalar(field.examples[0])}"
+            hinted = "such as" in (field.description or "")
+            return "" if hinted else f", such as {scalar(field.examples[0])}"
         sections = list(sections_of(field.annotation))
         if not sections:
             return ""
@@ -121,8 +121,8 @@ class Explanation:
 
     def _unknown(self, path: KeyPath) -> str:
         for model in self._models_at(path[:-1]):
-            if told := model.refused.get(str(path[-1])):
-                return told
+            if hinted := model.refused.get(str(path[-1])):
+                return hinted
         near = self._nearest(path)
         if near:
             return f"unknown key; did you mean '{near}'?"

@@ -36,14 +36,14 @@ GIVEN = 0.0
 class Leaf:
     """Entry that is not a section: its path, description ``what``, ``value`` and value as ``text``.
 
-    ``told`` is whether the value differs from the default, or has no default.
+    ``is_shown`` is whether the value differs from the default, or has no default.
     """
 
     path: str
     what: str
     value: Any
     text: str
-    told: bool
+    is_shown: bool
 
 
 def leaves_of(section: BaseModel, above: str = "") -> Iterator[Leaf]:
@@ -52,7 +52,7 @@ def leaves_of(section: BaseModel, above: str = "") -> Iterator[Leaf]:
         value, path = getattr(section, name), f"{above}{name}"
         quantity = entry_of(field)
         unit = quantity.unit if isinstance(quantity, Quantity) else None
-        told = field.is_required() or value != field.default
+        is_shown = field.is_required() or value != field.default
         for place, item in _items(value, path):
             if isinstance(item, Section):
                 yield from leaves_of(item, f"{place}.")
@@ -61,7 +61,7 @@ def leaves_of(section: BaseModel, above: str = "") -> Iterator[Leaf]:
                 text = in_words(item, unit, name)
                 if isinstance(quantity, File):  # wherever it is
                     text = PurePath(text).name
-                yield Leaf(place, what, item, text, told)
+                yield Leaf(place, what, item, text, is_shown)
 
 
 def _what(section: type[BaseModel], name: str, field: FieldInfo) -> str:

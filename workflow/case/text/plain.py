@@ -9,8 +9,8 @@ from workflow.case.sections import Section, quantities_of
 from workflow.case.text.readable import everyday_unit, pretty, suited_unit
 from workflow.case.units import to_base
 
-# Moments and energies share a base unit; from SAID_FROM on, a value is shown as a moment.
-MOMENT, SAID_FROM, SAID_IN = "N*mm", 1e3, "N*m"
+# Moments and energies share a base unit; from DISPLAY_FROM on, a value is shown as a moment.
+MOMENT, DISPLAY_FROM, DISPLAY_UNITS = "N*mm", 1e3, "N*m"
 
 # Size from which numbers are grouped by thousands.
 GROUPED = 1e4
@@ -18,7 +18,7 @@ GROUPED = 1e4
 
 def plain(number: float, unit: str | None, digits: int = 6) -> str:
     """Return a number in the base unit ``unit`` as text in a readable unit, where there is one."""
-    size, name = said_in(number, unit)
+    size, name = display_unit(number, unit)
     return f"{number / size:.{digits}g} {name}".rstrip()
 
 
@@ -41,16 +41,16 @@ def listed(things: Sequence[str]) -> str:
 
 def between(low: float, high: float, unit: str | None) -> str:
     """Return a range as text, both numbers in the unit of the larger one."""
-    size, name = said_in(max(low, high, key=abs), unit)
+    size, name = display_unit(max(low, high, key=abs), unit)
     return f"{low / size:.6g} to {high / size:.6g} {name}".rstrip()
 
 
-def said_in(number: float, unit: str | None) -> tuple[float, str]:
+def display_unit(number: float, unit: str | None) -> tuple[float, str]:
     """Return size, in the base unit, and name of the unit in which a number is shown."""
     if unit is None or unit == "1":
         return 1.0, ""
     if unit == MOMENT:
-        name = SAID_IN if abs(number) >= SAID_FROM else unit
+        name = DISPLAY_UNITS if abs(number) >= DISPLAY_FROM else unit
     else:
         name = suited_unit(number, unit)
     return (1.0 if name == unit else to_base(f"1 {name}", unit)), pretty(name)
@@ -64,8 +64,8 @@ def entries(section: Section, left_out: Sequence[str] = ()) -> str:
         numbers = value if isinstance(value, tuple) else (value,)
         if name in left_out or not numbers or not all(isinstance(n, float) for n in numbers):
             continue
-        said = [_of_entry(name, number, quantity.unit) for number in numbers]
-        text = f"({', '.join(said)})" if isinstance(value, tuple) else said[0]
+        printed = [_of_entry(name, number, quantity.unit) for number in numbers]
+        text = f"({', '.join(printed)})" if isinstance(value, tuple) else printed[0]
         texts.append(f"{name.replace('_', ' ')} {text}")
     return ", ".join(texts)
 
@@ -84,7 +84,7 @@ def _of_entry(name: str, number: float, unit: str | None) -> str:
     return plain(number, unit)
 
 
-def alike(title: str, texts: dict[str, str]) -> list[tuple[str, str]]:
+def merged_rows(title: str, texts: dict[str, str]) -> list[tuple[str, str]]:
     """Return rows called ``title``, one for all names with the same text, such as two bodies."""
     names: dict[str, list[str]] = {}
     for name, text in texts.items():
@@ -96,14 +96,14 @@ def of_bodies(title: str, section: Section) -> list[tuple[str, str]]:
     """Return rows called ``title`` with the quantities of every body in a ``section``."""
     bodies = {name: getattr(section, name) for name in type(section).model_fields}
     texts = {
-        name: told_of_body(body) if isinstance(body, Section) else body
+        name: body_text(body) if isinstance(body, Section) else body
         for name, body in bodies.items()
         if isinstance(body, Section | str)
     }
-    return alike(title, {name: text for name, text in texts.items() if text})
+    return merged_rows(title, {name: text for name, text in texts.items() if text})
 
 
-def told_of_body(body: Section) -> str:
+def body_text(body: Section) -> str:
     """Return the quantities of a body, after the name of its material if it has one."""
     name = getattr(body, "material", None)
     return ", ".join(text for text in (name, entries(body)) if text)

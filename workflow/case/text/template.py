@@ -124,5 +124,5 @@ def _other(
         for row in rows
         if row.key not in KINDS_ARE_NAMED_BY and not (row.off and row.key in above)
     ]
-    told = (model.__doc__ or "").split("\n")[0].rstrip(".").replace("``", "")
-    return EntryRow(name, [*named, *new], f"or: {told}", off=True)
+    reported = (model.__doc__ or "").split("\n")[0].rstrip(".").replace("``", "")
+    return EntryRow(name, [*named, *new], f"or: {reported}", off=True)

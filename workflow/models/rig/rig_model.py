@@ -53,7 +53,7 @@ class JointNodes:
     places: Array | None
 
     @property
-    def alike(self) -> bool:
+    def same_normal(self) -> bool:
         """True if all joints have the same normal."""
         return bool((self.normals == self.normals[0]).all())
 
@@ -161,7 +161,7 @@ class RigModel:
         return self.model if self.sector is None else self.sector.model
 
     @property
-    def driven_so(self) -> DynamicModel:
+    def model_at_first_harmonic(self) -> DynamicModel:
         """Model as harmonic 1 of the excitation drives it: a sector at its nodal diameters."""
         if self.sector is None:
             return self.model
@@ -272,7 +272,7 @@ class RigModel:
 
     def free(self) -> list[float]:
         """Return the lowest natural frequencies without the joints [Hz]."""
-        return _lowest(natural_frequencies(self.driven_so))
+        return _lowest(natural_frequencies(self.model_at_first_harmonic))
 
     def stuck(self, law: Laws, rest: Array | None = None) -> Array:
         """Return tangents ``(j, d, d)`` [N/mm] of joints that stick.
@@ -289,7 +289,7 @@ class RigModel:
 
         The damping matrix C is that of the open joints.
         """
-        held, model = sl.block_diag(*self.stuck(law, rest)), self.driven_so
+        held, model = sl.block_diag(*self.stuck(law, rest)), self.model_at_first_harmonic
         stiffness = model.stiffness + model.connection.conj().T @ held @ model.connection
         squares, shapes = sl.eigh(stiffness, model.mass)
         # Rigid motions of a free structure have no damping ratio.
@@ -316,8 +316,8 @@ class RigModel:
             else:
                 sliding[rows, 0, 0] = group.law.residual_stiffness
         return {
-            "stuck": _lowest(natural_frequencies(self.driven_so, stuck)),
-            "sliding": _lowest(natural_frequencies(self.driven_so, sliding)),
+            "stuck": _lowest(natural_frequencies(self.model_at_first_harmonic, stuck)),
+            "sliding": _lowest(natural_frequencies(self.model_at_first_harmonic, sliding)),
         }
 
 

@@ -18,13 +18,13 @@ class ExcitationSize:
         """Unit of an amplitude divided by the factor, as computed and as shown in figures."""
         return ("mm/N", "µm/N") if self.unit == "N" else ("mm", "µm")
 
-    def told(self, number: float) -> str:
+    def as_text(self, number: float) -> str:
         """Return the factor with its unit or name, as text."""
         return f"{number:g} N" if self.unit == "N" else f"{self.name} {number:g}"
 
     def under(self, number: float) -> str:
         """Return the text "under" or "at" this factor, for what happens there."""
-        return f"{'under' if self.unit == 'N' else 'at'} {self.told(number)}"
+        return f"{'under' if self.unit == 'N' else 'at'} {self.as_text(number)}"
 
 
 FORCE = ExcitationSize("force", "N", "amplitude of the force")

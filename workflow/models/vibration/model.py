@@ -120,7 +120,7 @@ class VibrationModel:
         """
         responses = {}
         for force in self.forces:
-            name = self.structure.driving.amount.told(force)
+            name = self.structure.driving.amount.as_text(force)
             with ExitStack() as watching:
                 for observer in observers:
                     watching.enter_context(observer.stage(name))

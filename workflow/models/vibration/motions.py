@@ -108,7 +108,7 @@ def accurate(
         finer = finer_resolution(present, error, accuracy) if accuracy is not None else None
         if finer is None:
             return motion
-        refined = problem.refined(finer)
+        refined = problem.with_resolution(finer)
         more_accurate = refined.solve(motion.frequency, motion.force, motion)
         if not more_accurate.converged:
             return motion

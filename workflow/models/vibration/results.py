@@ -92,7 +92,7 @@ class VibrationResults:
         import xarray as xr
 
         branch, resonance = response.branch, response.resonance
-        problem = branch.problem.refined(resonance.resolution)
+        problem = branch.problem.with_resolution(resonance.resolution)
         return xr.Dataset(
             {name: CURVE[name].variable(array) for name, array in response.columns.items()},
             coords={

@@ -94,5 +94,5 @@ class FrequencySweep:
         """
         peak = steps("resonance", partial(largest_motion, structure, branch, amplitudes))
         # The peak may have been found before the resolution was refined.
-        problem = branch.problem.refined(peak.resolution)
+        problem = branch.problem.with_resolution(peak.resolution)
         return steps("accurate resonance", partial(accurate, problem, peak, self.accuracy))

@@ -194,13 +194,13 @@ def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> No
         return
 
 
-def kept_files(folder: Path) -> list[Path]:
+def cache_files(folder: Path) -> list[Path]:
     """Return the cache files in a folder; files of other programs are left out."""
     return [path for path in folder.glob("*.h5") if NAME.fullmatch(path.name)]
 
 
 def _prune(folder: Path) -> None:
-    files = sorted(kept_files(folder), key=lambda path: path.stat().st_mtime, reverse=True)
+    files = sorted(cache_files(folder), key=lambda path: path.stat().st_mtime, reverse=True)
     total = 0
     for path in files:
         total += path.stat().st_size

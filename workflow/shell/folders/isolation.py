@@ -33,5 +33,5 @@ class Isolation:
                 raise
             if what not in self._failed:
                 self._failed.add(what)
-                told = f"{type(error).__name__}: {one_line(error)}"
-                self._warn(f"{what}: not written ({told}); the results are complete")
+                reported = f"{type(error).__name__}: {one_line(error)}"
+                self._warn(f"{what}: not written ({reported}); the results are complete")

@@ -116,25 +116,27 @@ def _read(file: int) -> dict[str, object]:
     """Return what the holder wrote; empty if it has not written anything yet."""
     try:
         os.lseek(file, 0, os.SEEK_SET)
-        told = json.loads(os.read(file, 4096))
+        reported = json.loads(os.read(file, 4096))
     except ValueError:
         return {}
-    return told if isinstance(told, dict) else {}
+    return reported if isinstance(reported, dict) else {}
 
 
-def _holder(told: dict[str, object]) -> str:
-    if not told:
+def _holder(reported: dict[str, object]) -> str:
+    if not reported:
         return "another process"
-    return f"process {told.get('process')} on {told.get('host')} since {told.get('since')}"
+    return (
+        f"process {reported.get('process')} on {reported.get('host')} since {reported.get('since')}"
+    )
 
 
 def _write(file: int, path: Path) -> None:
     since = time.strftime("%Y-%m-%d %H:%M:%S")
-    told = {"process": os.getpid(), "host": socket.gethostname(), "since": since}
+    reported = {"process": os.getpid(), "host": socket.gethostname(), "since": since}
     try:
         os.ftruncate(file, 0)
         os.lseek(file, 0, os.SEEK_SET)
-        os.write(file, json.dumps(told).encode())
+        os.write(file, json.dumps(reported).encode())
     except OSError as error:
         error.filename = str(path)
         raise

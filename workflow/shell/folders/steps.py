@@ -42,7 +42,7 @@ STEPS = "steps"
 
 
 @contextmanager
-def kept_steps(run: Run[Any]) -> Iterator[RunSteps]:
+def resumable_steps(run: Run[Any]) -> Iterator[RunSteps]:
     """Yield the steps of a run, which return the stored results of an earlier process first.
 
     Finished steps are saved however the run ends, unless an error of the disk ends it. Raises

@@ -77,7 +77,7 @@ def check_measured(case: Case, curves: Sequence[CurvesOf], layout: Layout) -> No
     """Raise UserError, before the run begins, for points that no run could be compared with.
 
     ``layout`` has the units of the curves. Checks that need the results, such as which of the
-    curves exist, are left to :func:`beside`.
+    curves exist, are left to :func:`compare_with_curve`.
     """
     for number, entry in enumerate(case.measured):
         meant = [wanted for wanted in curves if _begins(entry.curve, wanted.title)]
@@ -104,7 +104,9 @@ def _refusal(entry: Measured, x_unit: str, y_unit: str) -> str:
     return ""
 
 
-def beside(entry: Measured, file: h5py.File, curves: Sequence[CurvesOf]) -> MeasuredCurve:
+def compare_with_curve(
+    entry: Measured, file: h5py.File, curves: Sequence[CurvesOf]
+) -> MeasuredCurve:
     """Compare the points of an entry with its curve in a ``results.h5``. Raises UserError."""
     found = [curve for wanted in curves for curve in curves_in(file, wanted)]
     titles = [curve.title for curve in found]
@@ -178,7 +180,7 @@ def read_points(entry: Measured, x_unit: str, y_unit: str) -> MeasuredPoints:
     return MeasuredPoints(x, y, given)
 
 
-def told(found: MeasuredCurve) -> dict[str, Any]:
+def reported(found: MeasuredCurve) -> dict[str, Any]:
     """Return the comparison for the summary: computed minus measured, in base units.
 
     Relative deviations are relative to the mean and the rms of all measured values, since single
@@ -225,14 +227,14 @@ def tell_measured(case: Case, curves: Sequence[CurvesOf], results: Path) -> list
     with h5py.File(results) as file:
         for entry in case.measured:
             try:
-                content.append(told(beside(entry, file, curves)))
+                content.append(reported(compare_with_curve(entry, file, curves)))
             except UserError as error:
                 about = {"curve": entry.curve, "source": entry.source, "points": 0}
                 content.append({**about, "refused": str(error)})
     return content
 
 
-def doubts_of_measured(content: Sequence[dict[str, Any]]) -> Iterator[str]:
+def comparison_warnings(content: Sequence[dict[str, Any]]) -> Iterator[str]:
     """Yield a warning for each failed comparison and for points outside the computed range."""
     for number, one in enumerate(content):
         if "refused" in one:

@@ -8,7 +8,7 @@ from typing import Any
 
 from workflow.shell.analysis import Run
 from workflow.shell.folders.versions import versions
-from workflow.shell.output.measured import doubts_of_measured, lines_of_measured
+from workflow.shell.output.measured import comparison_warnings, lines_of_measured
 from workflow.shell.output.quantities import SummaryQuantity
 from workflow.shell.terminal.reporter import TERMINAL
 
@@ -23,8 +23,8 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     same in short.
     """
     reporter, measured = run.reporter, run.measured()
-    for doubt in doubts_of_measured(measured):
-        reporter.warn(doubt)
+    for warning in comparison_warnings(measured):
+        reporter.warn(warning)
     seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
     summary = {
         "title": run.case.title,
@@ -47,7 +47,7 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     )
     longest = sorted(seconds.items(), key=lambda item: -item[1])[:MOST_STAGES]
     most = ", ".join(f"{name} {value:.1f}" for name, value in longest)
-    reporter.say(f"  took {reporter.spent:.1f} s, most of it: {most}")
+    reporter.say(f"  took {reporter.elapsed:.1f} s, most of it: {most}")
 
 
 class QuantityError(ValueError):
@@ -90,7 +90,7 @@ def number_at(summary: Mapping[str, Any], path: str) -> float | None:
         return None
 
 
-def told(
+def reported(
     summary: Mapping[str, Any], quantities: Iterable[SummaryQuantity]
 ) -> list[SummaryQuantity]:
     """Return the quantities for which the summary has a number."""

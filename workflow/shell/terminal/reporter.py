@@ -36,12 +36,12 @@ FORECAST, LOG, TERMINAL = "progress", "run.log", "terminal"
 
 @dataclass
 class _Course:
-    """Progress of the long part of a run; ``told`` is the last forecast of its whole time shown."""
+    """Progress of the long part of a run; ``reported`` is the last forecast shown."""
 
     name: str
     row: ProgressRow
     forecast: Forecast
-    told: float | None = None
+    reported: float | None = None
 
 
 class _Stage:
@@ -57,7 +57,7 @@ class _Stage:
     ) -> None:
         self._name, self._of, self._row, self._say = name, of, row, say
         self._forecast, self._looked = Forecast(), time.perf_counter()
-        self._said, self._isolated = self._looked, isolated
+        self._printed, self._isolated = self._looked, isolated
 
     def __call__(self, done: int, total: int) -> None:
         """Show that ``done`` of ``total`` are done."""
@@ -71,11 +71,11 @@ class _Stage:
         self._looked = now
         self._forecast.reach(done / max(total, 1))
         at, left = f"{done} of {total} {self._of}".rstrip(), self._forecast.left
-        told = "" if left is None else f"{about(left)} more"
-        self._row.show(self._forecast.share, at, told)
-        if self._say and now - self._said > LINE:
-            self._said = now
-            self._say(f"{self._name}: {at}, {told}".rstrip(", "))
+        reported = "" if left is None else f"{about(left)} more"
+        self._row.show(self._forecast.share, at, reported)
+        if self._say and now - self._printed > LINE:
+            self._printed = now
+            self._say(f"{self._name}: {at}, {reported}".rstrip(", "))
 
 
 class Reporter:
@@ -110,7 +110,7 @@ class Reporter:
             self._log.close()
 
     @property
-    def spent(self) -> float:
+    def elapsed(self) -> float:
         """Time since the reporter was created [s]."""
         return time.perf_counter() - self._begin
 
@@ -164,7 +164,7 @@ class Reporter:
         with self._screen.row(name) as row:
             self._course = _Course(name, row, Forecast())
             with self.isolated(FORECAST):
-                self._after = self.expected.after * max(1.0, self.spent / self.expected.begun)
+                self._after = self.expected.after * max(1.0, self.elapsed / self.expected.begun)
                 if (expected := self.expected.course) > 0.0:
                     row.show(0.0, "", f"{about(expected + self._after)} to go")
             try:
@@ -227,16 +227,16 @@ class Reporter:
             course.row.show(course.forecast.share, at, "")
             return
         to_go = self._blended(course.forecast.left, course.forecast.share) + self._after
-        told = f"{about(to_go)} to go"
-        course.row.show(course.forecast.share, at, told)
-        whole, before = self.spent + to_go, course.told
+        reported = f"{about(to_go)} to go"
+        course.row.show(course.forecast.share, at, reported)
+        whole, before = self.elapsed + to_go, course.reported
         least = FIRST_STEP if course.forecast.steps == 1 else FIRST_WORK
         if course.forecast.measured < least or whole < SHORT_RUN:
             return
         if before is None or max(whole / before, before / whole) > CHANGED:
             where = ", ".join(filter(None, (course.name, at)))
-            (self.say if before is None else self.log)(f"{where}: {told}")
-            course.told = whole
+            (self.say if before is None else self.log)(f"{where}: {reported}")
+            course.reported = whole
 
 
 class _Telling(logging.Handler):

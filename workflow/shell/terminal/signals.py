@@ -11,7 +11,7 @@ def end_tidily() -> None:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
-def hear_no_more() -> None:
+def ignore_signals() -> None:
     """Ignore further signals, so that a second Ctrl-C does not disturb the end of a program."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)

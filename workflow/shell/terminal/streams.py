@@ -9,7 +9,7 @@ import sys
 from typing import TextIO
 
 # Replacements for non-ASCII letters that an encoding lacks.
-SPELLED = {
+REPLACEMENTS = {
     "µ": "u",
     "μ": "u",
     "±": "+-",
@@ -45,9 +45,9 @@ def hold_standard_streams() -> None:
     os.close(free)
 
 
-def spell_what_streams_lack() -> None:
+def replace_missing_characters() -> None:
     """Make stdout and stderr replace letters that their encoding lacks: um for µm, m^2 for m²."""
-    codecs.register_error(HANDLER, _spelled)
+    codecs.register_error(HANDLER, _replacement)
     for stream in (sys.stdout, sys.stderr):
         _reconfigure(stream)
 
@@ -58,13 +58,13 @@ def _reconfigure(stream: TextIO | None) -> None:
         reconfigure(errors=HANDLER)
 
 
-def _spelled(error: UnicodeError) -> tuple[str, int]:
+def _replacement(error: UnicodeError) -> tuple[str, int]:
     """Return the replacement of letters that cannot be encoded, and the position to continue at."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     missing = error.object[error.start : error.end]
     text = POWER.sub(lambda found: f"^{found[0].translate(POWERS)}", missing)
-    return "".join(SPELLED.get(letter, _ascii(letter)) for letter in text), error.end
+    return "".join(REPLACEMENTS.get(letter, _ascii(letter)) for letter in text), error.end
 
 
 def _ascii(letter: str) -> str:

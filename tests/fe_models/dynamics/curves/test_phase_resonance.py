@@ -227,7 +227,7 @@ def test_jenkins_oscillator_of_one_harmonic():
 
 
 def replaced(problem, samples):
-    return problem.refined(Resolution(problem.resolution.harmonics, samples))
+    return problem.with_resolution(Resolution(problem.resolution.harmonics, samples))
 
 
 def test_only_friction_damps():

@@ -36,7 +36,7 @@ class Blocks:
     fine: tuple[float, float]
     hold: str = "all"
     materials: tuple[dict[str, str], dict[str, str]] = (RUBBER, CERAMIC)
-    strips: int = 256
+    line_contact: int = 256
     half: bool = False
 
     def write(
@@ -74,7 +74,7 @@ class Blocks:
             "loads": loads,
         }
         materials = {f"body_{k}": STEEL | self.materials[k - 1] for k in (1, 2)}
-        grid, path = (self.strips, 8), folder / "blocks.yaml"
+        grid, path = (self.line_contact, 8), folder / "blocks.yaml"
         return write_case(path, structure, legs, mu=friction, grid=grid, materials=materials)
 
     def press(self, folder: Path, size: float, load: float) -> Path:

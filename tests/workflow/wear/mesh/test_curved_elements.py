@@ -49,6 +49,6 @@ def test_edges_that_are_taken_straight_are_doubted(tmp_path):
     midsides = foot.midsides.copy()
     arc = foot.mesh.boundaries["sole"][:3]
     midsides[arc] = foot.mesh.p[:, foot.mesh.facets[:, arc]].mean(axis=1).T
-    told = replace(mesh, bodies=(block, replace(foot, midsides=midsides)))
-    (doubt,) = folded_elements(told, imported)
-    assert doubt.startswith("foot: midside nodes fold some elements, so 3 edges of ")
+    reported = replace(mesh, bodies=(block, replace(foot, midsides=midsides)))
+    (warning,) = folded_elements(reported, imported)
+    assert warning.startswith("foot: midside nodes fold some elements, so 3 edges of ")

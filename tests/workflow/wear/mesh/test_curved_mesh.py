@@ -166,9 +166,9 @@ def test_hertz_of_a_mesh_that_is_coarser_than_the_contact(tmp_path, dimension: i
     case = pressed(tmp_path, dimension, order)
     summary = run(case, tmp_path / "out")
     assert summary["sole"]["peak_pressure"]["unworn"] == pytest.approx(PEAK[dimension], rel=0.015)
-    told = [line for line in summary["warnings"] if line.startswith("sole: ")]
-    assert any("carry the peak load" in line for line in told), told
-    assert not any(FORM in line for line in told), told
+    reported = [line for line in summary["warnings"] if line.startswith("sole: ")]
+    assert any("carry the peak load" in line for line in reported), reported
+    assert not any(FORM in line for line in reported), reported
 
 
 @pytest.mark.slow
@@ -186,8 +186,8 @@ def test_vertices_that_are_off_their_surface_are_told(tmp_path):
             gmsh.model.mesh.setNode(int(tag), [x, y + up, z], [])
         gmsh.write(str(tmp_path / "bodies.msh"))
     summary = run(case, tmp_path / "out")
-    (told,) = [line for line in summary["warnings"] if FORM in line]
-    share = float(re.search(r"may be (\d+)%", told)[1]) / 100.0
+    (reported,) = [line for line in summary["warnings"] if FORM in line]
+    share = float(re.search(r"may be (\d+)%", reported)[1]) / 100.0
     true = abs(summary["sole"]["peak_pressure"]["unworn"] / PEAK[2] - 1.0)
     assert 0.02 < true < share < 10.0 * true
 
@@ -195,9 +195,9 @@ def test_vertices_that_are_off_their_surface_are_told(tmp_path):
 def test_a_check_says_how_a_face_is_curved(tmp_path):
     """Outer facets are 2 mm long, and their chords deviate from the circle by 17 µm."""
     case = pressed(tmp_path, 2, 1)
-    said = invoke("check", case).output
-    assert "body 2 up to" in said
-    assert "off its facets (fitted through nodes, to" in said
+    printed = invoke("check", case).output
+    assert "body 2 up to" in printed
+    assert "off its facets (fitted through nodes, to" in printed
     loaded = load_case(case)
     assert isinstance(loaded, MeshCase)
     (sole,) = loaded.structure.mesh(None).interfaces

@@ -19,7 +19,9 @@ SAME = 1e-5
 
 def test_hertz_from_half_a_cylinder(tmp_path):
     """Blocks are 40 times as thick as the contact is wide; half of them carry P/2."""
-    blocks = Blocks((0, 80), 80, (0, 80), 80, (0, 2.5), materials=({}, {}), strips=4096, half=True)
+    blocks = Blocks(
+        (0, 80), 80, (0, 80), 80, (0, 2.5), materials=({}, {}), line_contact=4096, half=True
+    )
     modulus = 200e3 / (2.0 * (1.0 - 0.3**2))
     load, peak = np.pi * modulus / (4.0 * RADIUS), 0.5 * modulus / RADIUS  # 1 mm to either side
     case = blocks.press(tmp_path, 0.4, 0.5 * load)
@@ -67,7 +69,7 @@ def write(folder, planes, load=pushed, match=True, gap=None, **changes):
     return write_case(folder / f"{name}.yaml", described, legs, 0.3, (16, 16), **changes)
 
 
-def told(out):
+def reported(out):
     """Return fields on the grid and load histories of a run, by their names."""
     found = {}
 
@@ -106,7 +108,7 @@ def test_part_wears_as_the_whole_does(tmp_path, monkeypatch, planes, load, match
         case = write(tmp_path, cut, load, match, wear=wear, stress=stress, error_budget=budget)
         out = tmp_path / f"out{len(cut)}"
         summaries.append(run(case, out, *settings)["foot"])
-        fields.append(told(out))
+        fields.append(reported(out))
     part, whole = fields
     assert part.keys() == whole.keys()
     for name, values in whole.items():

@@ -42,8 +42,8 @@ def case_of(folder, moved=0.0, **changes):
 def test_sector_runs(tmp_path, order):
     """The run ties the cuts and announces what is tied."""
     case, elements = case_of(tmp_path), f"mesh.order={order}"
-    told = invoke("check", case).output
-    assert "one of 4: wheel_low and wheel_high match node to node" in told
+    reported = invoke("check", case).output
+    assert "one of 4: wheel_low and wheel_high match node to node" in reported
     summary = run(case, tmp_path / "out", elements)["structure"]
     assert summary["equilibrium_error"] < 1e-6
     stress = summary["peak_stress"]["worn"]["wheel"]["von_mises"]
@@ -61,7 +61,7 @@ def test_cuts_that_do_not_match_run(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "said"),
+    ("overrides", "printed"),
     [
         (["structure.cyclic.0.sectors=5"], "wheel_high is not wheel_low turned about the axis"),
         (["structure.cyclic.0.sectors=1"], "structure.cyclic.0.sectors"),
@@ -78,6 +78,6 @@ def test_cuts_that_do_not_match_run(tmp_path):
         (["structure.supports.0.group=wheel_low"], "supports.0.group=wheel_low: wheel_low is on a"),
     ],
 )
-def test_wrong_cuts_are_refused(tmp_path, overrides, said):
+def test_wrong_cuts_are_refused(tmp_path, overrides, printed):
     """The refusal is one line that names the entry."""
-    assert said in refused(case_of(tmp_path), *overrides)
+    assert printed in refused(case_of(tmp_path), *overrides)

@@ -61,9 +61,9 @@ def test_parts_and_instances_run(blocks, tmp_path):
     found = main_results(load_case(blocks), summary)
     groups = {quantity.group for quantity in found}
     assert groups == {"foot", *summary["structure"]["nodes"]}  # bodies as their file names them
-    told = {quantity.name for quantity in found if quantity.group == "Foot-1"}
-    assert {"elements", "median element (longest edge)"} <= told
-    assert "largest von Mises stress on the free surface, unworn" in told
+    reported = {quantity.name for quantity in found if quantity.group == "Foot-1"}
+    assert {"elements", "median element (longest edge)"} <= reported
+    assert "largest von Mises stress on the free surface, unworn" in reported
 
 
 def test_a_contact_may_be_called_as_a_body(blocks, tmp_path):
@@ -82,13 +82,13 @@ def test_worn_faces_come_back_at_the_users_nodes(blocks, tmp_path):
     edit(blocks, "4 N", "18 N")  # of the 20 N at which all of the foot slides: some of it does
     summary = run(blocks, tmp_path / "out")["foot"]
     for body, numbers, into in ((1, range(19, 28), -1.0), (2, range(1, 10), 1.0)):
-        told = summary["worn_nodes"][f"body_{body}"]
-        rows = np.loadtxt(tmp_path / "out" / told["file"], delimiter=",", skiprows=1)
+        reported = summary["worn_nodes"][f"body_{body}"]
+        rows = np.loadtxt(tmp_path / "out" / reported["file"], delimiter=",", skiprows=1)
         assert sorted(rows[:, 0].astype(int)) == list(numbers)
         np.testing.assert_allclose(rows[:, 1:3], 0.0, atol=1e-15)
         assert np.all(into * rows[:, 3] >= 0.0)
         assert np.max(into * rows[:, 3]) > 1e-10
-        assert told["volume_share"] == pytest.approx(1.0, abs=1e-12)
+        assert reported["volume_share"] == pytest.approx(1.0, abs=1e-12)
     ending = invoke("resultants", blocks, "--out", tmp_path / "files")
     assert ending.exit_code == 0, ending.stderr
     with h5py.File(tmp_path / "files" / "resultants.h5") as file:

@@ -22,14 +22,14 @@ def test_what_a_file_says_besides_is_named(blocks, tmp_path):
     given = "*Boundary\nBase-1.low, 1, 3\n*Cload, amplitude=up\n5, 3, -100.\n6, 3, -50.\n"
     given += "*Friction\n0.3\n"
     line = 1 + edit(file, "*Static\n", f"*Static\n{given}").index("*Static")
-    told = invoke("describe", file).output.splitlines()[-3:]
-    assert told == [
+    reported = invoke("describe", file).output.splitlines()[-3:]
+    assert reported == [
         f"not taken over: blocks.inp:{line + 1}: *boundary: Base-1.low, 1, 3",
         f"not taken over: blocks.inp:{line + 3}: *cload, amplitude=up: 5, 3, -100. ...",
         f"not taken over: blocks.inp:{line + 6}: *friction: 0.3",
     ]
-    said = " ".join(invoke("check", blocks).output.split())
-    assert "3 lines with loads, supports, contacts or materials not used" in said
+    printed = " ".join(invoke("check", blocks).output.split())
+    assert "3 lines with loads, supports, contacts or materials not used" in printed
 
 
 def test_a_face_in_two_parts(blocks, tmp_path):
@@ -41,9 +41,9 @@ def test_a_face_in_two_parts(blocks, tmp_path):
         "*Surface, type=ELEMENT, name=low_b\n3, S1\n4, S1\n",
     )
     face = "structure.contacts.0.face_2="
-    said = invoke("check", blocks, "--set", f"{face}[low_a, low_b]").output
-    assert "its faces share" not in said
-    assert "1 mm² of 4 and 1 mm²" in said
+    printed = invoke("check", blocks, "--set", f"{face}[low_a, low_b]").output
+    assert "its faces share" not in printed
+    assert "1 mm² of 4 and 1 mm²" in printed
     assert "its faces share" not in invoke("check", blocks, "--set", f"{face}low_a").output
     summary = run(blocks, tmp_path / "out", f"{face}[low_a, low_b]")
     assert summary["foot"]["peak_load"]["unworn"]["P"] == pytest.approx(40.0, rel=1e-6)
@@ -74,8 +74,8 @@ def test_a_face_that_is_half_named_is_doubted(blocks, tmp_path):
         "*Surface, type=ELEMENT, name=base_high\n5, S2\n6, S2\n7, S2\n8, S2\n",
         "*Surface, type=ELEMENT, name=base_high\n5, S2\n6, S2\n",
     )
-    said = " ".join(invoke("check", blocks).output.split())
-    assert "foot: its faces share only 0.5 mm² of 2 and 1" in said
+    printed = " ".join(invoke("check", blocks).output.split())
+    assert "foot: its faces share only 0.5 mm² of 2 and 1" in printed
 
 
 def test_keyword_that_is_not_read_is_refused_with_its_line(blocks):
@@ -152,10 +152,10 @@ def test_describe_refuses_in_one_line(cad, file, size, wrong):
 
 def test_size_is_for_cad_files_alone(cad, blocks):
     assert "mesh.size=0.5: 0.5 mm: the file already is a mesh" in refused(blocks, "mesh.size=0.5")
-    told = "structure.size=0.5: of the elements; allowed: as mesh.size"
-    assert refused(blocks, "structure.size=0.5").endswith(told)
-    told = "structure.order=2: of the elements; allowed: as mesh.order"
-    assert refused(blocks, "structure.order=2").endswith(told)
+    reported = "structure.size=0.5: of the elements; allowed: as mesh.size"
+    assert refused(blocks, "structure.size=0.5").endswith(reported)
+    reported = "structure.order=2: of the elements; allowed: as mesh.order"
+    assert refused(blocks, "structure.order=2").endswith(reported)
     edit(cad, "mesh:\n  size: 0.5 mm\n", "")
     assert "mesh.size: missing" in refused(cad)
 

@@ -21,7 +21,7 @@ HOT_STEEL = {"expansion": f"{ALPHA} 1/K"}
 # Half of a foot on half of a block, free to expand away from their plane of symmetry.
 SCENE = Blocks(
     *((0.0, 6.0), 6.0, (0.0, 2.0), 3.0, (0.0, 1.0), "z", (HOT_STEEL, HOT_STEEL)),
-    strips=32,
+    line_contact=32,
     half=True,
 )
 HELD = [
@@ -153,7 +153,7 @@ def test_expansion_is_asked_for_where_it_counts(heated):
 LID = {"group": "foot_z1", "at": [1.0, 0.0, 8.0]}
 DOWN = {"kind": "remote_displacement", **LID, "displacement": [0, 0, "-2 um"], "path": [1, 1]}
 BASE = [{"group": "base_z0", "hold": "all"}]
-WHOLE = Blocks((-6.0, 6.0), 6.0, (-2.0, 2.0), 3.0, (-1.0, 1.0), strips=32)
+WHOLE = Blocks((-6.0, 6.0), 6.0, (-2.0, 2.0), 3.0, (-1.0, 1.0), line_contact=32)
 
 
 @pytest.fixture

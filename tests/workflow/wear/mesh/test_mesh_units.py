@@ -52,24 +52,24 @@ def test_a_mesh_in_metres_wears_as_in_millimetres(blocks, tmp_path):
     )
 
 
-def _said(case, *options):
+def _printed(case, *options):
     return " ".join(invoke("check", case, *options).output.split())
 
 
 def test_a_forgotten_unit_is_doubted(blocks, tmp_path):
     """Metres read as mm make bodies of µm, with 4 N on a millionth of their face."""
-    assert "warning: " not in _said(blocks)
+    assert "warning: " not in _printed(blocks)
     divided(tmp_path / "blocks.inp", 1000.0)
-    said = _said(blocks)
+    printed = _printed(blocks)
     assert re.search(
-        r"warning: structure\.length_unit: bodies of 3 µm.*; 3 mm if they are in m", said
+        r"warning: structure\.length_unit: bodies of 3 µm.*; 3 mm if they are in m", printed
     )
-    assert "structure.loads.1: gives a pressure of about" in said
-    assert "warning: " not in _said(blocks, "--set", METRES)
+    assert "structure.loads.1: gives a pressure of about" in printed
+    assert "warning: " not in _printed(blocks, "--set", METRES)
     moved = "{kind: displacement, group: foot_high, path: [0, 1, 0, 0], "
     moved += "displacement: [0.8 mm, 0, 0]}"
-    said = _said(blocks, "--set", METRES, "--set", f"structure.loads.1={moved}")
-    assert "structure.loads.1.displacement: moves Foot-1, which is 1 mm long, by 0.8 mm" in said
+    printed = _printed(blocks, "--set", METRES, "--set", f"structure.loads.1={moved}")
+    assert "structure.loads.1.displacement: moves Foot-1, which is 1 mm long, by 0.8 mm" in printed
 
 
 def test_what_a_file_in_inches_says_is_offered_in_our_units(tmp_path):
@@ -120,13 +120,13 @@ def test_metres_of_a_universal_file_are_asked_about(tmp_path):
         "supports": [{"group": "base", "hold": "all"}], "loads": [pressure],
     }  # fmt: skip
     case = write_case(tmp_path / "cubes.yaml", structure, {"increments": [1, 1]}, grid=(8, 8))
-    said = _said(case)
-    assert "in m, as cubes.unv:2 says, converted to mm; bodies within 1000 x 1000 x 3000" in said
-    assert "warning: structure.length_unit: lengths are in m, as cubes.unv:2 says" in said
+    printed = _printed(case)
+    assert "in m, as cubes.unv:2 says, converted to mm; bodies within 1000 x 1000 x 3000" in printed
+    assert "warning: structure.length_unit: lengths are in m, as cubes.unv:2 says" in printed
     for unit, sides in (("mm", "1 x 1 x 3 mm"), ("m", "1000 x 1000 x 3000 mm")):
-        said = _said(case, "--set", f"structure.length_unit={unit}")
-        assert "warning: structure.length_unit" not in said
-        assert f"bodies within {sides}" in said
+        printed = _printed(case, "--set", f"structure.length_unit={unit}")
+        assert "warning: structure.length_unit" not in printed
+        assert f"bodies within {sides}" in printed
 
 
 def test_files_that_are_not_read_are_refused_with_what_to_export(blocks, tmp_path):

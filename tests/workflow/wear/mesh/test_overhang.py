@@ -12,7 +12,7 @@ END, FOOT, LOAD = 0.9, (-2.0, 2.0), 100.0
 
 
 def test_nothing_is_carried_where_one_body_is_not(tmp_path: Path) -> None:
-    blocks = Blocks((-6.0, END), 4.0, FOOT, 1.0, FOOT, strips=64)
+    blocks = Blocks((-6.0, END), 4.0, FOOT, 1.0, FOOT, line_contact=64)
     history, stage, first = solved(blocks.press(tmp_path, 0.4, LOAD))
     origin, pitch = history.interface.frame.origin[0], stage.grid.pitch[0]
     local = stage.grid.x[:, 0]

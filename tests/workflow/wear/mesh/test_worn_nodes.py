@@ -97,7 +97,7 @@ def test_nodes_far_from_the_contact_stay():
 
 @pytest.mark.parametrize("width", [8.0, 11.0])
 def test_worn_area_of_a_line_contact_is_kept_exactly(width):
-    frame, grid = flank(), Grid.strips(8.0, 200)
+    frame, grid = flank(), Grid.line_contact(8.0, 200)
     depth = 0.01 * (1.0 - (grid.x / 4.0) ** 2)
     x = np.random.default_rng(1).permutation(np.linspace(-0.5, 0.5, 23) ** 3 * 4.0 * width)
     points = frame.origin + np.outer(x, frame.axes[0])

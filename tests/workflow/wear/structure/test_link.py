@@ -33,17 +33,17 @@ def test_a_run_says_how_its_contacts_are_linked(whole) -> None:
 
 
 @pytest.mark.parametrize(
-    ("quality", "told"),
+    ("quality", "reported"),
     [((0.3, 0.01, 0.02), ""), ((0.3, 0.04, 0.01), "fewer nodes"), ((0.3, 0.02, 0.03), "coarse")],
 )
-def test_what_a_fit_leaves_is_warned_of(tmp_path, quality, told) -> None:
+def test_what_a_fit_leaves_is_warned_of(tmp_path, quality, reported) -> None:
     link = StructureLink(
         np.zeros((1, 3, 5, 1)), np.array([[-1.0, 0.0], [1.0, 0.0]]), np.array(quality)
     )
     reporter = Reporter(tmp_path / "log")
     report_link("flank", link, True, reporter)
-    assert len(reporter.warnings) == bool(told)
-    assert all(told in line and "refine the mesh" in line for line in reporter.warnings)
+    assert len(reporter.warnings) == bool(reported)
+    assert all(reported in line and "refine the mesh" in line for line in reporter.warnings)
 
 
 def flank(path, nodes: int, *settings: str) -> tuple[InterfaceHistory, FaceContact, FirstContact]:

@@ -28,7 +28,9 @@ def test_of_bodies_much_larger_than_the_contact_nothing_is_left(tmp_path, size, 
 
     The error is ten times smaller with eight times as many nodes. Half-spaces alone are exact.
     """
-    blocks = Blocks((-80, 80), 80, (-80, 80), 80, (-2.5, 2.5), materials=({}, {}), strips=4096)
+    blocks = Blocks(
+        (-80, 80), 80, (-80, 80), 80, (-2.5, 2.5), materials=({}, {}), line_contact=4096
+    )
     modulus = 200e3 / (2.0 * (1.0 - 0.3**2))
     load, peak = np.pi * modulus / (4.0 * RADIUS), 0.5 * modulus / RADIUS  # 1 mm to either side
     case = blocks.press(tmp_path, size, load)
@@ -55,7 +57,7 @@ def test_layers_and_strips(tmp_path, depth, hold, load, plain, wrong):
     The contact is 2.0 to 4.8 mm wide and has 9 to 19 nodes; half-spaces are off by more than
     ``plain``.
     """
-    blocks = Blocks((-25, 25), depth, (-5, 5), 5, (-5, 5), hold, strips=320)
+    blocks = Blocks((-25, 25), depth, (-5, 5), 5, (-5, 5), hold, line_contact=320)
     case = blocks.press(tmp_path, 0.25, load)
     stuck = 0.3 if hold == "all" else None
     _, stage, linked = solved(case)
@@ -130,5 +132,5 @@ def test_a_rough_foot_near_the_edge_of_a_block(tmp_path):
             np.linalg.norm((found.shear[0, :, 0] - shear)[pressure > 0.0]) / limit,
             abs(first.energy.sum() / fine.loads.Edx.sum() - 1.0),
         )
-        told = np.less(errors, wrong)
-        assert not told.any() if settings else told.all()
+        reported = np.less(errors, wrong)
+        assert not reported.any() if settings else reported.all()

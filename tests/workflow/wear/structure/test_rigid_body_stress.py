@@ -53,8 +53,8 @@ def test_the_elastic_body_is_stressed_as_hertz_says(tmp_path: Path, shape: str, 
         ],
     )
     assert ending.exit_code == 0, ending.stderr
-    told = json.loads((tmp_path / "out/summary.json").read_text())["interface"]["stress"]
-    assert list(told["von_mises"]) == list(told["tension"]) == [f"body_{elastic}"]
+    reported = json.loads((tmp_path / "out/summary.json").read_text())["interface"]["stress"]
+    assert list(reported["von_mises"]) == list(reported["tension"]) == [f"body_{elastic}"]
     with h5py.File(tmp_path / "out/results.h5") as file:
         section = file["stress/section/interface"]
         assert list(section["unworn"]) == [f"body_{elastic}"]

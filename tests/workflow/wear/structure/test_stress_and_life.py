@@ -87,11 +87,11 @@ def test_section_is_that_of_the_recorded_tractions_and_of_the_structure(request,
                 assert np.abs(carried[2]).max() < 1e-3 * scale
                 assert np.abs(carried[4:]).max() < 1e-2 * scale
                 assert carried[0].min() > 0.1 * scale
-                told = run.summary[flank]["stress"]["von_mises"][name][moment]
+                reported = run.summary[flank]["stress"]["von_mises"][name][moment]
                 equivalent = von_mises(recorded)
-                assert told["value"] == pytest.approx(np.nanmax(equivalent), rel=1e-12)
-                assert told["x"] in grid.x
-                assert told["depth"] in depths
+                assert reported["value"] == pytest.approx(np.nanmax(equivalent), rel=1e-12)
+                assert reported["x"] in grid.x
+                assert reported["depth"] in depths
                 section = group[f"{moment}/body_{number}"]
                 np.testing.assert_allclose(section["von_mises"][()], equivalent, rtol=1e-12)
                 assert "past it" in section["stress"].attrs["description"]
@@ -100,10 +100,10 @@ def test_section_is_that_of_the_recorded_tractions_and_of_the_structure(request,
 def test_summary_tells_the_largest_of_the_maps(normal: Any) -> None:
     with h5py.File(normal.folder / "results.h5") as file:
         for flank in FLANKS:
-            grid, told = grid_of(file["grid"][flank]), normal.summary[flank]["stress"]
+            grid, reported = grid_of(file["grid"][flank]), normal.summary[flank]["stress"]
             for number, name in BODIES.items():
                 for quantity in ("cracking_parameter", "friction_parameter", "tension"):
-                    largest = told[quantity][name]
+                    largest = reported[quantity][name]
                     for moment in ("unworn", "worn"):
                         place = f"stress/life/{flank}/{moment}/body_{number}/{quantity}"
                         values = file[place][()]
@@ -240,30 +240,30 @@ class Warnings:
     """Minimal reporter that collects warnings."""
 
     def __init__(self) -> None:
-        self.said: list[str] = []
+        self.printed: list[str] = []
 
     def warn(self, line: str) -> None:
-        self.said.append(line)
+        self.printed.append(line)
 
 
 @pytest.mark.parametrize(("share", "count"), [(0.0, 0), (0.3, 1)])
 def test_shear_that_nobody_knows_is_warned_of(share: float, count: int) -> None:
     """At peak load there are two warnings, since the section lacks it too."""
     for increment, more in ((0, 0), (1, count)):
-        heard: Any = Warnings()
+        received: Any = Warnings()
         unknown = np.zeros((2, 3))
         unknown[1, increment] = share
-        _report_stick(unknown, 1, heard)
-        assert [line[:13] for line in heard.said] == (
+        _report_stick(unknown, 1, received)
+        assert [line[:13] for line in received.printed] == (
             ["up to 30 % of"] * more + ["stress.life l"] * count
         )
 
 
 @pytest.mark.parametrize(
-    ("fits", "told"),
+    ("fits", "reported"),
     [([0.01, 0.02], ""), ([0.01, 0.04], "uncertain by 4.0 %"), ([0.01], "too few nodes")],
 )
-def test_what_is_not_known_of_the_structure_is_warned_of(fits: list[float], told: str) -> None:
+def test_what_is_not_known_of_the_structure_is_warned_of(fits: list[float], reported: str) -> None:
     links = [
         StructureLink(np.zeros((1, 3, 2, 1)), np.zeros((2, 2)), np.array([0.3, q, 0.0]))
         for q in fits
@@ -271,10 +271,10 @@ def test_what_is_not_known_of_the_structure_is_warned_of(fits: list[float], told
     carried = [BulkStress(link, METAL, 1) for link in links]
     moment = SimpleNamespace(carried=carried)
     stress: Any = SimpleNamespace(name="a", bulk=len(fits) == 2, moments={"unworn": moment})
-    heard: Any = Warnings()
-    _report_carried(stress, heard)
-    assert len(heard.said) == bool(told)
-    assert all(told in line for line in heard.said)
+    received: Any = Warnings()
+    _report_carried(stress, received)
+    assert len(received.printed) == bool(reported)
+    assert all(reported in line for line in received.printed)
 
 
 # --- settings -----------------------------------------------------------------------------------

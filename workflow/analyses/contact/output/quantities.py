@@ -7,7 +7,7 @@ from workflow.analyses.contact.output.layout import LAYOUT
 from workflow.layout.declared import unit_in
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
-from workflow.shell.output.summary import estimate, told
+from workflow.shell.output.summary import estimate, reported
 
 LAST, LOOP = "after the last increment", "last closed cycle"
 MOTIONS = {
@@ -75,7 +75,7 @@ def main_results(case: BodiesCase, summary: Summary) -> list[SummaryQuantity]:
                 LOOP,
             ),
         ]
-    return told(summary, quantities)
+    return reported(summary, quantities)
 
 
 def _large(numbers: Summary, names: tuple[str, ...]) -> list[str]:

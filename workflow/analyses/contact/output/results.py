@@ -108,14 +108,14 @@ def _fields(state: ContactState, friction: float) -> dict[str, Array | Mask]:
 def _summary(outcome: ContactOutcome) -> dict[str, Any]:
     case, grid, history = outcome.case, outcome.grid, outcome.history
     friction, surfaces = case.friction.coefficient, case.structure.surfaces
-    told = grid, friction, outcome.table, history, outcome.strain
+    reported = grid, friction, outcome.table, history, outcome.strain
     return {
         **({} if surfaces is None else {"surfaces": surfaces.summary(grid)}),
         "increments": len(outcome.table),
         "history": {key: getattr(history, key) for key in HISTORY},
         "states": state_summaries(grid, friction, history),
-        "loop": loop_summary(*told),
-        "increments_error": increments_errors(*told),
+        "loop": loop_summary(*reported),
+        "increments_error": increments_errors(*reported),
         "convolutions": outcome.convolutions,
     }
 

@@ -25,9 +25,9 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
 
     Raises UserError for a file that is not a specimens case, or for bodies that cannot be meshed.
     """
-    with reporter.stage("reduction", "steps") as told:
+    with reporter.stage("reduction", "steps") as reported:
         key, file = "structure.specimens", rig.specimens
-        bodies = reduced_specimens(key, file, reporter, told, rig.target_distance)
+        bodies = reduced_specimens(key, file, reporter, reported, rig.target_distance)
     for finer in bodies.case.finer_than_nodes("no rig has more"):
         reporter.say(finer)
     try:

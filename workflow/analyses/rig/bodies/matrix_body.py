@@ -28,7 +28,7 @@ from workflow.shell.run_time import factors
 
 if TYPE_CHECKING:
     from fe_models.joints.reduction import ReducedModel
-    from fe_models.matrices import OwnMatrices
+    from fe_models.matrices import ExternalMatrices
 
 # Files with their modification times and sizes.
 Stamps = tuple[tuple[str, int, int], ...]
@@ -46,7 +46,7 @@ DENSE_MATRICES, SHAPES, ALL_KEPT = 12, 3, 5.0
 # Softening of massless motions (a share) from which a warning is given.
 SOFT = 0.03
 # Number of frequencies above rigid motions, and of held unknowns, that are reported.
-TOLD = 6
+MOST_REPORTED = 6
 # Bounds of a plausible structure with joints: its lowest elastic frequency [Hz], its mass [t].
 SLOWEST, FASTEST = 0.05, 1e6
 LIGHTEST, HEAVIEST = 1e-9, 1e4
@@ -140,7 +140,7 @@ class MatrixFiles(Section):
         states = ((path, path.stat()) for path in sorted(files))
         return tuple((str(path), state.st_mtime_ns, state.st_size) for path, state in states)
 
-    def read(self) -> OwnMatrices:
+    def read(self) -> ExternalMatrices:
         """Return the matrices; unchanged files are not read again.
 
         Raises ``MatrixError`` and InputFileError.
@@ -156,8 +156,8 @@ class MatrixFiles(Section):
 
 
 @lru_cache(4)
-def _read(files: MatrixFiles, stamps: Stamps) -> OwnMatrices:
-    from fe_models.matrices import FileUnits, own_matrices
+def _read(files: MatrixFiles, stamps: Stamps) -> ExternalMatrices:
+    from fe_models.matrices import FileUnits, external_matrices
 
     for name, *_ in stamps:
         _check_links(name)
@@ -165,7 +165,7 @@ def _read(files: MatrixFiles, stamps: Stamps) -> OwnMatrices:
     length, force = to_base(f"1 {files.units.length}", "mm"), to_base(f"1 {files.units.force}", "N")
     mass = 0.0 if files.units.mass is None else to_base(f"1 {files.units.mass}", "t")
     units = FileUnits(length, force, mass)
-    return own_matrices(files.sources, file, given_unknowns(files.unknowns), units)
+    return external_matrices(files.sources, file, given_unknowns(files.unknowns), units)
 
 
 def _check_links(file: str) -> None:
@@ -409,14 +409,16 @@ class MatrixBody(JointedBody, Matrices):
     def outline(self) -> list[tuple[str, str]]:
         matrices = self.matrices.read()
         taken = (f"{part} {name}".rstrip() for part, name in (matrices.taken or {}).items())
-        left = f"; not used: {', '.join(matrices.left)}" if matrices.left else ""
+        left = f"; not used: {', '.join(matrices.unused)}" if matrices.unused else ""
         count = len(matrices.unknowns)
         unknowns = f"{count} of {counted(len(self.points), 'point')}: {known(self.points)}"
         modal = sum(u.direction == "modal" for u in matrices.unknowns)
         unknowns += f"; {modal} of modes" if modal else ""
         if matrices.held:
-            unknowns += f"; held: {', '.join(u.name for u in matrices.held[:TOLD])}"
-            unknowns += f", {len(matrices.held)} in total" if len(matrices.held) > TOLD else ""
+            unknowns += f"; held: {', '.join(u.name for u in matrices.held[:MOST_REPORTED])}"
+            unknowns += (
+                f", {len(matrices.held)} in total" if len(matrices.held) > MOST_REPORTED else ""
+            )
         masses = matrices.moved_mass()
         mass = ", ".join(f"{plain(m, 't', 4)} along {axis}" for axis, m in masses.items())
         rows = [
@@ -426,9 +428,9 @@ class MatrixBody(JointedBody, Matrices):
         ]
         if isinstance(self.driven, LoadCase):
             rows.append(("load", _resultant(matrices, self.driven.load)))
-        return [*rows, *self._told_frequencies()]
+        return [*rows, *self._quick_frequencies()]
 
-    def _told_frequencies(self) -> list[tuple[str, str]]:
+    def _quick_frequencies(self) -> list[tuple[str, str]]:
         """Return the lowest frequencies without joints and additions, if quick to find."""
         lowest = self.lowest_frequencies()
         if lowest is None or not len(lowest):
@@ -442,7 +444,7 @@ class MatrixBody(JointedBody, Matrices):
             return None
         return _frequencies(self.matrices, self.matrices.stamps)
 
-    def doubts(self, highest: float) -> Iterator[str]:
+    def plausibility_warnings(self, highest: float) -> Iterator[str]:
         """Yield plausibility warnings about entries, for motions up to ``highest`` [Hz]."""
         if self.massless is not None and highest > SOFT * self.massless:
             yield (
@@ -478,7 +480,7 @@ class MatrixBody(JointedBody, Matrices):
             )
 
 
-def _resultant(matrices: OwnMatrices, number: int) -> str:
+def _resultant(matrices: ExternalMatrices, number: int) -> str:
     """Return the sum of the forces of a load, per unit load."""
     column = matrices.loads[:, number - 1]
     sums = [
@@ -495,6 +497,6 @@ def _frequencies(files: MatrixFiles, stamps: Stamps) -> Array:
     from fe_models.solvers.linear_solver import SolverError
 
     try:
-        return lowest_frequencies(files.read(), TOLD)
+        return lowest_frequencies(files.read(), MOST_REPORTED)
     except (MatrixError, SolverError):  # masses that the case adds may still cure this
         return np.empty(0)

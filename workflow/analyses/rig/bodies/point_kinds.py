@@ -25,7 +25,7 @@ def matching(points: Sequence[str], wanted: str) -> list[str]:
 def known(points: Sequence[str]) -> str:
     """Return a list of all points as text, with those of a kind together."""
     kinds = Counter(map(kind_of, points))
-    told = [f"{kind}, {kind} 1 to {kind} {count}" for kind, count in kinds.items() if kind]
+    reported = [f"{kind}, {kind} 1 to {kind} {count}" for kind, count in kinds.items() if kind]
     single = [point for point in points if not kind_of(point)]
     more = [f"and {len(single) - MOST_LISTED} more"] if len(single) > MOST_LISTED else []
-    return ", ".join([*told, *single[:MOST_LISTED], *more])
+    return ", ".join([*reported, *single[:MOST_LISTED], *more])

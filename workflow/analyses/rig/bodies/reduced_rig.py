@@ -20,9 +20,9 @@ from fe_models.matrices.reduction import listed_names
 from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.types import Array, Progress, Tally
 from workflow.analyses.rig.bodies.matrix_body import LoadCase, MatrixBody
+from workflow.analyses.rig.bodies.placeholder import matrices_by_name, specimen_by_name
 from workflow.analyses.rig.bodies.point_body import PointBody
 from workflow.analyses.rig.bodies.ring import RingOfSectors, with_next
-from workflow.analyses.rig.bodies.stand_in import matrices_by_name, specimen_by_name
 from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJoint, Joint
 from workflow.analyses.rig.place_names import PlaceNames, link_along
 from workflow.analyses.rig.places import Moved
@@ -51,8 +51,8 @@ def reduced_rig_model(
     that is driven by an ``engine_order``. Raises UserError for a file without such a body, and for
     points that it does not have.
     """
-    with reporter.stage("reduction", "steps") as told:
-        found = _reduced_body(body, reporter, told)
+    with reporter.stage("reduction", "steps") as reported:
+        found = _reduced_body(body, reporter, reported)
     return _rig_of(found, body, joint, ring, engine_order)
 
 
@@ -85,7 +85,7 @@ def _rig_of(
     except EntryError as error:
         if not massless:
             raise
-        raise EntryError(error.key, f"{error.message}{_told(massless)}") from error
+        raise EntryError(error.key, f"{error.message}{_reported(massless)}") from error
 
 
 def _rig_on(
@@ -269,7 +269,7 @@ def _of_matrices(
         raise UserError(f"structure.{error.part or 'matrices'}: {error}") from error
     count = f"matrices: {len(reduced.stiffness)} unknowns in the rig"
     if body.massless is None:
-        reporter.log(f"{count}{_told(massless)}")
+        reporter.log(f"{count}{_reported(massless)}")
     else:
         light = listed_names(massless) or "none"
         reporter.log(f"{count}; given mass for {body.massless:g} Hz: motions mostly of {light}")
@@ -298,7 +298,7 @@ def _warn_of_slow(body: MatrixBody, reduced: ReducedModel, reporter: Reporter) -
         )
 
 
-def _told(massless: tuple[str, ...]) -> str:
+def _reported(massless: tuple[str, ...]) -> str:
     """Return a clause on displacements that are not in the model, to append to a message."""
     if not massless:
         return ""

@@ -12,9 +12,9 @@ from pydantic import Field, model_validator
 from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.bodies.point_body import PointBody
 from workflow.analyses.rig.bodies.ring import RingOfSectors
-from workflow.analyses.rig.doubts import RIGID, about_matrices, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
 from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
+from workflow.analyses.rig.plausibility import RIGID, about_matrices, about_modes
 from workflow.analyses.rig.structure import (
     FrictionRig,
     ReducedBody,
@@ -171,7 +171,7 @@ class VibrationCaseBase(Case):
         mean = self.moves_mean or any(order % 2 == 0 for order in excited)
         return tuple(sorted({*harmonics, *excited} | ({0} if mean else set())))
 
-    def doubts(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[str]:
         yield from about_modes(
             "frequencies", self.frequencies, self.structure, self._stuck, self._shares
         )

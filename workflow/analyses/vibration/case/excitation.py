@@ -41,10 +41,10 @@ def amount_in(numbers: Mapping[str, Any]) -> tuple[ExcitationSize, float]:
     return amount, float(numbers[amount.name])
 
 
-def told_in(numbers: Mapping[str, Any]) -> str:
+def load_text(numbers: Mapping[str, Any]) -> str:
     """Return the force or level of a response, as text."""
     amount, number = amount_in(numbers)
-    return amount.told(number)
+    return amount.as_text(number)
 
 
 def under_in(numbers: Mapping[str, Any]) -> str:

@@ -11,7 +11,6 @@ from pydantic import Field, StrictBool, model_validator
 from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.bodies.point_body import PointBody
 from workflow.analyses.rig.bodies.ring import RingOfSectors
-from workflow.analyses.rig.doubts import RIGID
 from workflow.analyses.rig.excitation import Frequency
 from workflow.analyses.rig.joint_sections import (
     ElasticJoint,
@@ -19,6 +18,7 @@ from workflow.analyses.rig.joint_sections import (
     Joint,
     VibrationLaw,
 )
+from workflow.analyses.rig.plausibility import RIGID
 from workflow.analyses.rig.structure import (
     FrictionRig,
     ReducedBody,
@@ -146,8 +146,8 @@ class VibrationCase(DrivenMass):
     def moves_mean(self) -> bool:
         return any(law.moves_mean for law in self.laws)
 
-    def doubts(self) -> Iterator[str]:
-        yield from super().doubts()
+    def plausibility_warnings(self) -> Iterator[str]:
+        yield from super().plausibility_warnings()
         uneven = [law for law in self.laws if isinstance(law, ElasticJoint) and law.moves_mean]
         if uneven and not any(number % 2 == 0 for number in self.harmonics if number > 0):
             yield (
@@ -207,13 +207,13 @@ class VibrationCase(DrivenMass):
         return self
 
     @model_validator(mode="after")
-    def _further_from_its_own(self) -> VibrationCase:
+    def _check_further_starts(self) -> VibrationCase:
         low, high = self.frequencies
         for number, start in enumerate(self.further_branches):
             if start.force not in self.amounts:
-                allowed = ", ".join(map(self.amount.told, self.amounts))
+                allowed = ", ".join(map(self.amount.as_text, self.amounts))
                 raise disagreement(
-                    f"{self.amount.told(start.force)}: not among those of the case; allowed: "
+                    f"{self.amount.as_text(start.force)}: not among those of the case; allowed: "
                     f"{allowed}",
                     f"further_branches.{number}.force",
                 )

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.vibration.case.excitation import told_in
+from workflow.analyses.vibration.case.excitation import load_text
 from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.style import BLACK
@@ -39,7 +39,7 @@ def engine_orders(file: h5py.File, contents: VibrationContents) -> Figure:
     for name, colour in shaded(contents.responses, MOST_DOTS):
         numbers = file["responses"][name].attrs
         at = 60.0 * float(numbers["resonance"]) / order
-        axis.plot(at, numbers["resonance"], "o", color=colour, label=told_in(numbers), zorder=4)
+        axis.plot(at, numbers["resonance"], "o", color=colour, label=load_text(numbers), zorder=4)
     axis.set(xlabel="speed [rpm]", ylabel="frequency [Hz]", xlim=speeds, ylim=(0.0, span[1]))
     legend_below(figure, [axis], columns=4)
     return figure
@@ -47,5 +47,7 @@ def engine_orders(file: h5py.File, contents: VibrationContents) -> Figure:
 
 def _title(responses: list[h5py.Group], order: float) -> str:
     ends = [responses[0].attrs, responses[-1].attrs][: len(responses)]
-    at = (f"{60.0 * numbers['resonance'] / order:.4g} rpm, {told_in(numbers)}" for numbers in ends)
+    at = (
+        f"{60.0 * numbers['resonance'] / order:.4g} rpm, {load_text(numbers)}" for numbers in ends
+    )
     return f"Engine order {order:g} meets resonance at {'; '.join(at)}"

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.vibration.case.excitation import told_in, under_in
+from workflow.analyses.vibration.case.excitation import load_text, under_in
 from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
@@ -38,7 +38,7 @@ def loops(file: h5py.File, contents: VibrationContents) -> Figure:
         for coarse in _resolutions(response)[:-1]:
             left.plot(*_curve(coarse, "expansion"), color=colour, **COARSE)
         left.plot(*_curve(_finest(response)), color=colour)
-        _draw_branch(right, _finest(response), colour, told_in(response.attrs))
+        _draw_branch(right, _finest(response), colour, load_text(response.attrs))
     _bound(right, [_finest(response) for response in shown])
     _label(left, right, shown[0])
     legend_below(figure, [right], columns=3, title="excitation: stick slope (dashed)")

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from workflow.analyses.vibration.case.excitation import amount_in, told_in, under_in
+from workflow.analyses.vibration.case.excitation import amount_in, load_text, under_in
 from workflow.analyses.vibration.figures.engine import engine_orders
 from workflow.analyses.vibration.figures.loops import loops
 from workflow.analyses.vibration.figures.modes import modes
@@ -106,7 +106,7 @@ def frequency_response(file: h5py.File, contents: VibrationContents) -> Figure:
     for response, colour in _shown(file, contents):
         _, force = amount_in(response.attrs)
         size = TO_MICRONS * response["amplitude"][:, -1]
-        label = f"{told_in(response.attrs)}: {response.attrs['resonance']:.4g} Hz"
+        label = f"{load_text(response.attrs)}: {response.attrs['resonance']:.4g} Hz"
         draw_motions(
             axis, response, response["frequency"][()], size / force, color=colour, label=label
         )
@@ -213,7 +213,7 @@ def resonance(file: h5py.File, contents: VibrationContents) -> Figure:
 def _draw_amplitudes(axis: Axes, file: h5py.File, contents: VibrationContents) -> None:
     for response, colour in _shown(file, contents):
         size = TO_MICRONS * response["amplitude"][:, -1]
-        look = {"color": colour, "label": told_in(response.attrs), "linewidth": 1.4}
+        look = {"color": colour, "label": load_text(response.attrs), "linewidth": 1.4}
         draw_motions(axis, response, response["frequency"][()], size, **look)
         mark_bifurcations(axis, response, "frequency", TO_MICRONS, colour)
     drawn = [response for response, _ in _shown(file, contents)]

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.vibration.case.excitation import told_in
+from workflow.analyses.vibration.case.excitation import load_text
 from workflow.analyses.vibration.output.outcome import DIAMETERS, VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, whole_ticks
 from workflow.pictures.style import BLACK, BLUE, ORANGE
@@ -51,5 +51,5 @@ def _title(sectors: int, order: int, numbers: h5py.AttributeManager) -> str:
     diameters = abs(int(numbers["nodal_diameters"][list(numbers["harmonics"]).index(1)]))
     return (
         f"Engine order {order} on {sectors} sectors: {diameters} nodal diameters, resonance at "
-        f"{numbers['resonance']:.4g} Hz, {told_in(numbers)}"
+        f"{numbers['resonance']:.4g} Hz, {load_text(numbers)}"
     )

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.vibration.case.excitation import amount_in, told_in, under_in
+from workflow.analyses.vibration.case.excitation import amount_in, load_text, under_in
 from workflow.analyses.vibration.figures.stability import draw_motions
 from workflow.analyses.vibration.figures.states import (
     COLUMNS,
@@ -140,7 +140,7 @@ def _draw_response(axis: Axes, response: h5py.Group) -> None:
     size = TO_MICRONS * response["amplitude"][:, -1] / force
     draw_motions(axis, response, response["frequency"][()], size, color=BLACK)
     _mark_resonance(axis, response)
-    axis.set_title(f"{told_in(response.attrs)}: {response.attrs['resonance']:.4g} Hz")
+    axis.set_title(f"{load_text(response.attrs)}: {response.attrs['resonance']:.4g} Hz")
 
 
 def _mark_resonance(axis: Axes, response: h5py.Group) -> None:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.vibration.case.excitation import amount_in, told_in, under_in
+from workflow.analyses.vibration.case.excitation import amount_in, load_text, under_in
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import new_figure, plain_ticks, spread
@@ -65,7 +65,7 @@ def node_states(file: h5py.File, contents: VibrationContents) -> Figure:
         _draw_over_frequency(bottom, response, order)
         for axis in (top, bottom):
             axis.axvline(response.attrs["resonance"], color=BLACK, linestyle=":", linewidth=1.2)
-        top.set_title(f"{told_in(response.attrs)}: {response.attrs['resonance']:.4g} Hz")
+        top.set_title(f"{load_text(response.attrs)}: {response.attrs['resonance']:.4g} Hz")
         bottom.set_xlabel("frequency [Hz]")
     over = f"amplitude / {amount.name} [{amount.receptance[1]}]"
     panels[0, 0].set(xscale="log", yscale="log", ylabel=over)
@@ -89,7 +89,7 @@ def pad_states(file: h5py.File, contents: VibrationContents) -> Figure:
             place = _point_near(response, factor * float(response.attrs["resonance"]))
             frequency = response["frequency"][place]
             _draw_pad(axis, file["contact"], kinds_of(response)[place])
-            axis.set_title(f"{told_in(response.attrs)}, {frequency:.4g} Hz", fontsize="small")
+            axis.set_title(f"{load_text(response.attrs)}, {frequency:.4g} Hz", fontsize="small")
         row[0].set_ylabel(f"{name}\ny [mm]")
     for axis in panels[-1]:
         axis.set_xlabel("x [mm]")

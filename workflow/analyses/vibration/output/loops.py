@@ -45,15 +45,15 @@ def loops_of(
     frequency = case.loops.frequency
     nearest = int(np.abs(branch.frequencies - frequency).argmin())
     start, loops = branch.solutions[nearest], []
-    told = case.amount.told(start.force)
+    reported = case.amount.as_text(start.force)
     for harmonics in case.loops.harmonics or (start.resolution.harmonics,):
         every = case.with_mean(harmonics)
-        reporter.doing(f"{told}: loop at {frequency:g} Hz, {harmonics} harmonics")
+        reporter.doing(f"{reported}: loop at {frequency:g} Hz, {harmonics} harmonics")
         samples = max(case.resolution.samples, SAMPLES_PER_PERIOD * every[-1])
-        problem = branch.problem.refined(Resolution(every, samples))
+        problem = branch.problem.with_resolution(Resolution(every, samples))
         motion = steps("loop", partial(_known, problem, frequency, start))
         if not motion.converged:
-            reporter.warn(f"{told}: no loop at {frequency:g} Hz: {motion.message}")
+            reporter.warn(f"{reported}: no loop at {frequency:g} Hz: {motion.message}")
             continue
         number = None if case.loops.joints is None else case.loops.joints - 1
         load = case.laws[number or 0].normal_load
@@ -150,8 +150,8 @@ def _stick_slope(
     sticks = (motion.cycle.states[:, rows][:, model.touching[rows]] == STICK).all(axis=1)
     groups = grouped(model.law, model.rig.joints).rows()
     laws = [of.law for of, at in groups if at.start < rows.stop and rows.start < at.stop]
-    at_once = all(isinstance(law, FrictionContact | Jenkins) for law in laws)
-    if not at_once and not sticks.all():
+    run_parallel = all(isinstance(law, FrictionContact | Jenkins) for law in laws)
+    if not run_parallel and not sticks.all():
         return None
     moved, pulled = ((curve - np.roll(curve, 1))[sticks] for curve in (displacement, force))
     square = float(moved @ moved)

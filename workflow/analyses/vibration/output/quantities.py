@@ -12,7 +12,7 @@ from workflow.analyses.vibration.output.outcome import AT, MODES
 from workflow.models.vibration.amount import LEVEL
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
-from workflow.shell.output.summary import estimate, told
+from workflow.shell.output.summary import estimate, reported
 
 LINEAR, RECORDS = "linear limits", "left_out_of_records"
 ERROR = "joints' vibration or energy lost, due to harmonics and samples"
@@ -90,14 +90,14 @@ def main_results(case: VibrationCase, summary: Summary) -> list[SummaryQuantity]
         for number, mode in enumerate(summary.get(MODES, ()))
         for quantity in _of_mode(f"mode {mode['mode']}", f"{MODES}.{number}", summary)
     )
-    return told(summary, [*limits, *records, *responses, *modes])
+    return reported(summary, [*limits, *records, *responses, *modes])
 
 
 def of_response(
     group: str, path: str, response: Mapping[str, Any], summary: Summary
 ) -> Iterator[SummaryQuantity]:
     """Yield results of the response to a force or level, at a ``path`` of the summary."""
-    numbers = NUMBERS | {name: told for name, told in BESIDE.items() if name in response}
+    numbers = NUMBERS | {name: reported for name, reported in BESIDE.items() if name in response}
     if amount_in(response)[0] is LEVEL:
         numbers |= {"receptance": ("mm", "amplitude over level at resonance", "")}
     return _of(group, path, numbers, WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
@@ -123,12 +123,12 @@ def _of_answers(
             error = estimate(summary, f"{of}.error", ERROR)
             which = f", motion {number + 1} of {count}" if count > 1 else ""
             suffix = f" at {answer['frequency']:g} Hz{which}"
-            told = {
+            reported = {
                 name: (unit, text + suffix, everyday)
                 for name, (unit, text, everyday) in ANSWER.items()
                 if name in answer["motions"][number]
             }
-            yield from _of(group, of, told, WITH_ERROR, error)
+            yield from _of(group, of, reported, WITH_ERROR, error)
 
 
 def _of(

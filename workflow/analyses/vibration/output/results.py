@@ -172,7 +172,7 @@ def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping
     """Yield all bifurcations, each with the name of the curve that it is on."""
     for response in outcome.responses:
         yield from (
-            (outcome.case.amount.told(response.force), found) for found in response.bifurcations
+            (outcome.case.amount.as_text(response.force), found) for found in response.bifurcations
         )
     for number, branch in enumerate(outcome.further):
         yield from ((f"further branch {number}", found) for found in branch.bifurcations)
@@ -246,19 +246,19 @@ def _response_line(case: VibrationCase, response: Response, label: str) -> str:
     """Return a line on the response to a force."""
     numbers = response.numbers
     parts = [
-        f"{case.amount.told(response.force)}: resonance {numbers['resonance']:.5g} Hz",
+        f"{case.amount.as_text(response.force)}: resonance {numbers['resonance']:.5g} Hz",
         f"{label} moves {TO_MICRONS * numbers['amplitude']:.4g} um{_beside(numbers)}",
         f"damping {percent(numbers['damping'])}",
         f"slips {percent(numbers['slip'])} of the cycle",
         f"{numbers['points']} points",
         f"error {numbers['error']:.1e}",
     ]
-    said = []
+    printed = []
     if numbers["folds"]:
-        said.append(counted(len(numbers["folds"]), "fold"))
+        printed.append(counted(len(numbers["folds"]), "fold"))
     if numbers.get("unstable_points"):
-        said.append(f"{numbers['unstable_points']} of them unstable")
-    return "; ".join([", ".join(parts), *said])
+        printed.append(f"{numbers['unstable_points']} of them unstable")
+    return "; ".join([", ".join(parts), *printed])
 
 
 def _beside(numbers: Mapping[str, Any]) -> str:
@@ -304,7 +304,7 @@ def _further_line(amount: ExcitationSize, branch: Curves) -> str:
     else:
         ends = ", which leads to a known one" if numbers["joins"] else ""
     return (
-        f"{amount.told(numbers[amount.name])}: a further branch from "
+        f"{amount.as_text(numbers[amount.name])}: a further branch from "
         f"{numbers['lowest_frequency']:.5g} to {numbers['highest_frequency']:.5g} Hz{ends}, "
         "at most "
         f"{TO_MICRONS * numbers['largest_amplitude']:.4g} um"
@@ -317,7 +317,7 @@ def _backbone_line(amount: ExcitationSize, backbone: Curves) -> str:
     )
     return (
         f"phase resonance: {first:.5g} Hz {amount.under(low)}, {last:.5g} Hz under "
-        f"{amount.told(high)}"
+        f"{amount.as_text(high)}"
     )
 
 

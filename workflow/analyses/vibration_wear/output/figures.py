@@ -29,7 +29,7 @@ from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
 from workflow.pictures.panels import (
     Figures,
     legend_below,
-    legend_beside,
+    legend_on_the_right,
     new_figure,
     plain_ticks,
     shaded,
@@ -111,8 +111,8 @@ def frequency_response(file: h5py.File) -> Figure:
         axis.plot(peaks[:, 0], TO_MICRONS * peaks[:, 1] / forces[place], **PEAKS)
         explain_stability(axis, responses)
         over = f"amplitude / {amount.name} [{amount.receptance[1]}]"
-        axis.set(title=amount.told(forces[place]), ylabel=over, yscale="log")
-        legend_beside(axis, "cycles: resonance")
+        axis.set(title=amount.as_text(forces[place]), ylabel=over, yscale="log")
+        legend_on_the_right(axis, "cycles: resonance")
     panels[-1].set(xlabel="frequency [Hz]", xscale="log")
     for side in (panels[-1].xaxis, *(axis.yaxis for axis in panels)):
         plain_ticks(side)
@@ -143,7 +143,7 @@ def evolution(file: h5py.File, contents: VibrationWearContents) -> Figure:
     frequency.plot(place, history["stuck"][:, 0], "k--", label="stuck")
     columns = spread(range(len(forces)), len(FORCE_COLOURS))
     for column, colour in zip(columns, FORCE_COLOURS, strict=False):
-        label = _amount(file).told(forces[column])
+        label = _amount(file).as_text(forces[column])
         frequency.plot(place, history["resonance"][:, column], "o-", color=colour, label=label)
     frequency.set_ylabel("resonance [Hz]")
     legend_below(figure, [frequency], title="resonance")

@@ -13,7 +13,7 @@ from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
 from workflow.case.text.plain import times
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
-from workflow.shell.output.summary import number_at, told
+from workflow.shell.output.summary import number_at, reported
 
 WORN = "depth or volume, by the wear steps, and by harmonics and samples of the motion that wears"
 MOTION = "joints' vibration or energy lost, by harmonics and samples"
@@ -56,7 +56,9 @@ CURVES = (
 def main_results(case: VibrationWearCaseBase, summary: Summary) -> list[SummaryQuantity]:
     """Return results of every state, the unworn one first."""
     states = enumerate(summary["states"])
-    return told(summary, chain.from_iterable(_of_state(n, state, summary) for n, state in states))
+    return reported(
+        summary, chain.from_iterable(_of_state(n, state, summary) for n, state in states)
+    )
 
 
 def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[SummaryQuantity]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.transforms.threads import at_once
+from sa_solver.transforms.threads import run_parallel
 from sa_solver.types import Array, Progress, unseen
 from workflow.analyses.wear.approximations.registry import PARTS
 from workflow.analyses.wear.budget.parts import ContactErrors, ErrorByResult, ResultError
@@ -52,7 +52,7 @@ def error_budget(
             )
             for contact in outcome.interfaces
         }
-        errors = at_once([partial(errors_of, contact) for contact in contacts.values()])
+        errors = run_parallel([partial(errors_of, contact) for contact in contacts.values()])
         return dict(zip(contacts, errors, strict=True))
 
 

@@ -23,8 +23,8 @@ from workflow.analyses.wear.case.sections import (
     Ratio,
 )
 from workflow.analyses.wear.case.worn_bodies import Worn, wearing
-from workflow.case.doubts import idle_steps, uneven_cells
 from workflow.case.fields import shown
+from workflow.case.plausibility import idle_steps, uneven_cells
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 from workflow.case.text.plain import entries, of_bodies, plain, shares, times
 
@@ -208,7 +208,7 @@ class WearCase(WithScans, Case):
         """Return the extent of the contact grid along x and y [mm], None if only a mesh has it."""
         return None
 
-    def doubts(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[str]:
         yield from idle_steps("wear.step.cycles", self.wear.step.cycles, self.wear.cycles)
         if (sides := self.face_sides()) is not None:
             yield from uneven_cells(sides, self.contact.grid)
@@ -233,7 +233,7 @@ class FiniteElementCase(WearCase):
     )
     coupling: Coupling = entry("return of worn surfaces to the structure", default=Coupling())
 
-    def told_of_nodes(self) -> Iterator[str]:
+    def remarks_on_nodes(self) -> Iterator[str]:
         """Yield remarks on measured surfaces with more detail than the nodes can follow."""
         half_space = "the half-space resolves what its grid does"
         yield from self.finer_than_nodes(

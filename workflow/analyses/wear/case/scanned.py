@@ -111,12 +111,12 @@ class ScannedFace:
 
     def outline(self) -> Iterator[tuple[str, str]]:
         """Yield a row for each body's surface."""
-        for name, text in self.surfaces.told(self.summary()).items():
+        for name, text in self.surfaces.reported(self.summary()).items():
             yield f"surface {name.removeprefix('body_')}", f"{self.name}: {text}"
 
-    def doubts(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[str]:
         """Yield plausibility warnings about units and a grid too coarse for the roughness."""
-        yield from self.surfaces.doubts(self.grid, self.key)
+        yield from self.surfaces.plausibility_warnings(self.grid, self.key)
 
     def finer_than_nodes(self, rest: str) -> Iterator[str]:
         """Yield a remark on each surface finer than the nodes; ``rest`` says what resolves it."""
@@ -138,15 +138,15 @@ class WithScans:
         """Yield the faces with measured surfaces."""
         yield from ()
 
-    def told_surfaces(self) -> dict[str, Any]:
+    def surfaces_summary(self) -> dict[str, Any]:
         """Return the summary's entry on measured surfaces; empty if there are none."""
         faces = {face.name: face.summary() for face in self.scanned()}
         return {"surfaces": faces} if faces else {}
 
-    def surface_doubts(self) -> Iterator[str]:
+    def surface_warnings(self) -> Iterator[str]:
         """Yield the plausibility warnings about measured surfaces."""
         for face in self.scanned():
-            yield from face.doubts()
+            yield from face.plausibility_warnings()
 
     def finer_than_nodes(self, rest: str) -> Iterator[str]:
         """Yield remarks on surfaces finer than the nodes; ``rest`` says what resolves them."""

@@ -50,12 +50,12 @@ PressingForce = Annotated[
 Place = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4)]
 
 # Tolerance on the sum of shares, which is 1 except for rounding in the case file.
-SHARES_APART = 1e-6
+SHARES_DIFFERENCE = 1e-6
 
 
 def check_shares(shares: Sequence[float]) -> None:
     """Refuse a mix of missions whose shares do not add up to 1."""
-    if abs(sum(shares) - 1.0) > SHARES_APART:
+    if abs(sum(shares) - 1.0) > SHARES_DIFFERENCE:
         raise disagreement(
             f"shares that add up to {sum(shares):g}; allowed: shares that add up to 1", "mix"
         )

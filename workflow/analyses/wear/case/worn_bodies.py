@@ -16,7 +16,7 @@ from workflow.analyses.wear.case.evolution import Evolution
 from workflow.case import units
 from workflow.case.fields import Quantity, shown
 from workflow.case.sections import Length, Section, disagreement, entry
-from workflow.case.text.plain import alike, entries
+from workflow.case.text.plain import entries, merged_rows
 
 # Metals wear 1e2 to 1e6 um^3 per joule; a forgotten unit gives 1e16.
 VolumePerEnergy = Annotated[
@@ -200,7 +200,7 @@ def wearing(bodies: Mapping[str, Worn]) -> list[tuple[str, str]]:
     for name, body in bodies.items():
         changes = "" if body.evolution is None else ", changing with dissipated energy"
         texts[name] = f"{body.law}, {entries(body)}{changes}"
-    return alike("wear law", texts)
+    return merged_rows("wear law", texts)
 
 
 class _LawMayBeLeftOut:

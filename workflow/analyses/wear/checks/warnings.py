@@ -30,18 +30,18 @@ FEWEST_NODES = 5
 # randomly moved vertices, this estimate was 3 to 8 times the actual change.
 FORM_SHARE = 0.1
 # Relative difference of the energies of structure and half-space that indicates different slips.
-ENERGIES_APART = 0.25
+ENERGY_DIFFERENCE = 0.25
 # Share by which the half-space with its own friction may dissipate less than the nodes, which slip
 # element by element: 0.3 to 0.5 on 12 x 16 nodes that never slide as a whole, 0.01 on 40 nodes
 # across. It may dissipate more, which is why it is used.
-FULL_APART = 0.6
+FULL_DIFFERENCE = 0.6
 # Share of the work of sliding below which a difference of energies is rounding of a table.
 NO_ENERGY = 1e-3
 
 
 def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: Reporter) -> None:
     """Report remarks on the model, cycles that do not close, and faces that lose contact."""
-    for text in case.told_of_nodes():
+    for text in case.remarks_on_nodes():
         reporter.say(text)
     for remark in stage.remarks():
         (reporter.warn if remark.is_warning else reporter.say)(remark.text)
@@ -91,7 +91,7 @@ def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Re
     face = history.interface
     assert isinstance(face, Interface)
     pressed = history.force[stage.peak, 2] > 0.0
-    unsure = form_left(face, pressed)
+    unsure = form_error(face, pressed)
     bodies = (stage.structure.bodies[place].elastic.material for place in face.bodies)
     # Waves of twice an element on a half-space: p = π E* height / wavelength (Johnson, 13.2).
     waves = np.pi * ElasticPair(*bodies).contact_modulus * unsure / (2.0 * _mesh_size(face))
@@ -104,14 +104,14 @@ def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Re
         )
 
 
-def form_left(face: Interface, pressed: Mask) -> float:
+def form_error(face: Interface, pressed: Mask) -> float:
     """Return the error of form of both bodies under the nodes ``pressed`` ``(n,)`` [mm]."""
     below = pressed if face.projection is None else face.projection.T @ pressed > 0.0
     left = 0.0
     for number, nodes in ((1, below), (2, pressed)):
         surface = face.face(number).surface
-        if surface is not None and surface.left is not None:
-            left += float(surface.left[nodes].max(initial=0.0))
+        if surface is not None and surface.form_error is not None:
+            left += float(surface.form_error[nodes].max(initial=0.0))
     return left
 
 
@@ -165,7 +165,7 @@ def warn_of_contact(
             )
         if case.contact.method == "nodes":
             continue  # the grid only shows them
-        if warning := _energies_apart(source, stage, interface.loads, result):
+        if warning := _energies_differ(source, stage, interface.loads, result):
             reporter.warn(f"{stage.name}: {warning}")
         if result.touches_border:
             reporter.warn(stage.border_warning)
@@ -175,13 +175,13 @@ def warn_of_contact(
             reporter.warn(line)
 
 
-def _energies_apart(
+def _energies_differ(
     source: LoadSource, stage: FaceContact, loads: LoadHistory, first: FirstContact
 ) -> str:
     """Return the reason why source and half-space differ in energy, or an empty string."""
     from_file, stated = isinstance(source, ResultantsSource), loads.mean_energy
     found, unit = float(first.energy.sum()), "N" if stage.grid.line else "N mm"
-    if abs(found - stated) <= ENERGIES_APART * max(found, stated):
+    if abs(found - stated) <= ENERGY_DIFFERENCE * max(found, stated):
         return ""
     if not first.cycle:
         whose = "structure.file" if from_file else "the structure"
@@ -197,7 +197,7 @@ def _energies_apart(
             "Edy (of each increment alone), friction.coefficient, size and gap of the face, and "
             "whether the mesh behind the file resolves the slip zone"
         )
-    if isinstance(source, StructureLoads) and stated > found / (1.0 - FULL_APART):
+    if isinstance(source, StructureLoads) and stated > found / (1.0 - FULL_DIFFERENCE):
         return (
             f"the structure's nodes dissipate {stated:.3g} {unit} per cycle, but the half-space, "
             f"by which the contact wears, {found:.3g}: the mesh is too coarse for the slip zone; "

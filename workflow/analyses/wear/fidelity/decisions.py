@@ -48,7 +48,7 @@ FEWEST_ELEMENTS, MOST_ELEMENTS, FINER_MESH = 7, 160, 4
 # Cells of a contact grid along one direction. The largest number holds in the plane; in space,
 # where each doubling takes four times as long, the limit is this factor times the case's number. No
 # grid is coarser than the case's by more than the last factor.
-MOST_STRIPS, FINER_SPACE, COARSER = 512, 2, 4
+MOST_LINE_CELLS, FINER_SPACE, COARSER = 512, 2, 4
 # Rungs of a ladder that are probed before a choice: an order of convergence needs three.
 LEAST_RUNGS = 3
 # Loosest tolerance of the contact solver for which the error that it causes was measured.
@@ -161,7 +161,7 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
     def worn(cells: int) -> Numbers:
         return section_wear(changed(section, {"contact.grid": (cells, cells)}))
 
-    most = FINER_SPACE * across if in_space else max(across, MOST_STRIPS)
+    most = FINER_SPACE * across if in_space else max(across, MOST_LINE_CELLS)
     climbs = [climb("strips across the flank", across, most, worn)]
     if in_space:
         most = FINER_SPACE * along

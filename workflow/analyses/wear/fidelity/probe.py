@@ -109,7 +109,7 @@ def slot_wear(case: DovetailCase, cells: int) -> Numbers:
     """
     structure = _structure(case)
     length, width = case.structure.slot_length, case.structure.face_width
-    grid = Grid.strips(length, cells)
+    grid = Grid.line_contact(length, cells)
     contact = NormalContact(HalfSpace(grid, ElasticPair(case.material(1), case.material(2))))
     laws = case.wear_of(1).described(), case.wear_of(2).described()
     geometry, cycles = case.structure.geometry(), case.wear.cycles

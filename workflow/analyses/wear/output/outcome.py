@@ -36,7 +36,8 @@ class InterfaceOutcome:
     """Outcome of a wear run for one contact.
 
     ``unworn`` are its loads before wear and ``first`` the contact of that cycle. ``state`` has its
-    surfaces at the end, and ``told`` returns a cycle on them. ``kinetics`` ``(j, 5)`` are those at
+    surfaces at the end, and ``reported`` returns a cycle on them. ``kinetics`` ``(j, 5)`` are those
+    at
     ``cycles`` ``(j,)``. ``finer`` returns both cycles in twice as many increments, or None where
     the loads between increments are unknown.
     """
@@ -45,7 +46,7 @@ class InterfaceOutcome:
     unworn: FaceLoads
     first: FirstContact
     state: InterfaceState
-    told: Callable[[], ContactEnd]
+    reported: Callable[[], ContactEnd]
     cycles: Array
     kinetics: Array
     finer: Callable[[InterfaceState], list[CycleTractions] | None] = lambda _: None
@@ -109,7 +110,7 @@ class InterfaceOutcome:
         (:func:`peak_change`), divided by 2^p - 1 with p = :data:`AT_EDGES`. Implicit steps over
         increments in turn have errors of first order, so that their change is not divided.
         """
-        left, other = step_errors(self.state, self.stage.areas), self.ended.pressure_of_companion
+        left, other = step_errors(self.state, self.stage.areas), self.ended.pressure_of_coarse_run
         if left is None or other is None:
             return None
         change = peak_change(self.end.pressure, other, at_rest=not len(self.state.paths))
@@ -155,7 +156,7 @@ class InterfaceOutcome:
     @cached_property
     def ended(self) -> ContactEnd:
         """Cycle at the end; reading it waits for the result."""
-        return self.told()
+        return self.reported()
 
 
 def peak_change(pressure: Array, other: Array, at_rest: bool) -> float:

@@ -12,7 +12,7 @@ from workflow.analyses.wear.output.measures import interfaces
 from workflow.layout.declared import unit_in
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
-from workflow.shell.output.summary import estimate, number_at, told
+from workflow.shell.output.summary import estimate, number_at, reported
 
 # Source of estimated errors in the report: totals of the error budget.
 BUDGET = "all parts of the error budget below"
@@ -51,7 +51,7 @@ def main_results(case: WearCase, summary: Summary) -> list[SummaryQuantity]:
         for name in interfaces(summary)
         for quantity in (*_worn(case, summary, name), *_stressed(case, summary, name))
     ]
-    return told(summary, [*quantities, *_of_bolts(summary), *_of_structure(summary)])
+    return reported(summary, [*quantities, *_of_bolts(summary), *_of_structure(summary)])
 
 
 def named(body: str) -> str:
@@ -184,14 +184,14 @@ def _of_structure(summary: Summary) -> Iterator[SummaryQuantity]:
         for moment in MOMENTS:
             path = f"{STRUCTURE}.peak_stress.{moment}.{body}.notch"
             text = f"largest von Mises stress on the free surface, {moment}"
-            yield of(text, f"{path}.von_mises", "MPa", **_left_by_mesh(summary, path))
+            yield of(text, f"{path}.von_mises", "MPa", **_mesh_error(summary, path))
         yield of("elements", f"{mesh}.elements", "1")
         for size in ("smallest", "median", "largest"):
             yield of(f"{size} element (longest edge)", f"{mesh}.size.{size}", "mm")
         yield of(f"worst element ({QUALITY})", f"{mesh}.worst_quality", "1")
 
 
-def _left_by_mesh(summary: Summary, path: str) -> dict[str, Any]:
+def _mesh_error(summary: Summary, path: str) -> dict[str, Any]:
     """Return the error of a stress, or a note if the stress grows with every refinement."""
     error = number_at(summary, f"{path}.error")
     if error is not None and error >= 1.0:

@@ -100,8 +100,8 @@ def write_output(outcome: Outcome, probe_results: ProbeResults, run: Run[WearCas
             source, stages, state, case.friction_evolves, moves, folder, reporter
         )
         structure.warn(case.accuracy, reporter)
-    with reporter.stage("stress under the contacts", "steps") as told:
-        stresses = _stresses(outcome, structure, reporter, told)
+    with reporter.stage("stress under the contacts", "steps") as reported:
+        stresses = _stresses(outcome, structure, reporter, reported)
     budget = error_budget(outcome, reporter, probe_results)
     with reporter.stage("results"):
         recorded, contents, measured = _write_results(outcome, structure, stresses, budget, run)
@@ -303,8 +303,8 @@ def _summary(
         "per_length": outcome.source.line,
         "cycles": float(state.cycles[-1]),
         "jumps": state.jump,
-        "work": vars(state.spent),
-        **outcome.case.told_surfaces(),
+        "work": vars(state.cost),
+        **outcome.case.surfaces_summary(),
         **({"structure": structure.summary(state)} if structure else {}),
         **{
             name: _interface_summary(outcome, contact)
@@ -349,7 +349,7 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
         "explicit_limit": first.stable_cycles if np.isfinite(first.stable_cycles) else None,
         "contact_residual": first.largest_residual,
         "link": link_summary(first.link),
-        "convolutions": first.spent.convolutions,
+        "convolutions": first.cost.convolutions,
         "linear_regime": {
             name: None if regime is None else _regime_summary(regime)
             for name, regime in contact.regimes.items()

@@ -19,7 +19,7 @@ import numpy as np
 from sa_solver.half_space.stress import von_mises
 from sa_solver.half_space.subsurface import COMPONENTS
 from sa_solver.ties import first_largest
-from sa_solver.transforms.threads import at_once
+from sa_solver.transforms.threads import run_parallel
 from sa_solver.types import Array, Mask, Material, Progress, Tally
 from wear.contact.tractions import CycleTractions
 from wear.cracking.bulk_stress import BulkStress
@@ -196,7 +196,7 @@ def contact_stresses(
     _report_stick(np.array(unknown), peak, reporter)
     strained = sum(len(case.terms(stage.name).strained) for stage, _ in contacts)
     done = Tally(progress, len(MOMENTS) * strained)
-    stresses = at_once(
+    stresses = run_parallel(
         [partial(_interface_stress, case, peak, *contact, done) for contact in contacts]
     )
     for stress, (_, cycles) in zip(stresses, contacts, strict=True):

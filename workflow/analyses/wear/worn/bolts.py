@@ -19,7 +19,7 @@ from workflow.shell.output.results import ResultsWriter
 BOLTS, TENSION = "bolts", "bolts/tension"
 
 
-def kept_tensions(source: LoadSource, state: CoupledState) -> dict[str, Array]:
+def stored_tensions(source: LoadSource, state: CoupledState) -> dict[str, Array]:
     """Return the tensions ``(bolts, t)`` of a state under its last solved loads, by dataset."""
     if not isinstance(source, StructureLoads) or not source.bolts:
         return {}
@@ -65,11 +65,11 @@ class BoltTensions:
             return {}
         bolts = {}
         for number, bolt in enumerate(self._stage.bolts):
-            told = {m: self._of(tensions[number]) for m, tensions in self.moments.items()}
-            before, after = told["unworn"]["peak"], told["worn"]["peak"]
+            reported = {m: self._of(tensions[number]) for m, tensions in self.moments.items()}
+            before, after = reported["unworn"]["peak"], reported["worn"]["peak"]
             shortening = {} if bolt.force is None else {"shortening": self._shortening(number)}
             lost = {"lost": 1.0 - after / before} if before else {}
-            bolts[bolt.name] = {**shortening, "tension": told, **lost}
+            bolts[bolt.name] = {**shortening, "tension": reported, **lost}
         return {BOLTS: bolts}
 
     def sentences(self) -> Iterator[str]:

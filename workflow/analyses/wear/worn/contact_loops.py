@@ -34,7 +34,7 @@ Measurements = Mapping[str, Sequence[Mapping[str, float]]]
 """Values that the loops of each interface measure, by loop."""
 
 
-def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:
+def stored_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:
     """Return the loops of the contacts ``names`` as arrays for the file of their jump."""
     arrays: dict[str, Array] = {}
     for name, loop in zip(names, loops, strict=True):

@@ -301,8 +301,8 @@ def worn_structure(
             folder.reserve("worn.msh", "the mesh with the worn faces, in mm")
         ) as unfinished:
             write_msh(unfinished, written["worn"])
-    with reporter.stage("stress", "steps") as told:
-        done = Tally(told, 2 * steps(len(mesh.bodies)))
+    with reporter.stage("stress", "steps") as reported:
+        done = Tally(reported, 2 * steps(len(mesh.bodies)))
         shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
         states = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
         stresses = stage.stresses(states, shown, done)

@@ -34,16 +34,16 @@ from workflow.analyses.contact.case import (
     touches_along_a_line,
     unworn_contact,
 )
-from workflow.analyses.contact.doubts import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.load_path import Leg, LegsOrFile, LegT, LineLeg
 from workflow.analyses.contact.load_table import LoadTable
+from workflow.analyses.contact.plausibility import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.surfaces import KEY
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.case.sections import ContactSection, Cycles, PressingForce, WearSection
-from workflow.case.doubts import heights, long_stroke
 from workflow.case.fields import Quantity, Whole
 from workflow.case.files.input_files import read_heights
+from workflow.case.plausibility import heights, long_stroke
 from workflow.case.sections import GridCells, Length, LineCells, Section, Title, disagreement, entry
 from workflow.case.source import Source
 from workflow.case.text.plain import plain, shares
@@ -295,7 +295,7 @@ class TwoBodiesWearCase(WearCase):
         _check(self)
         return self
 
-    def told_surfaces(self) -> dict[str, Any]:
+    def surfaces_summary(self) -> dict[str, Any]:
         surfaces = self.structure.surfaces
         return {} if surfaces is None else {"surfaces": surfaces.summary(self.grid)}
 
@@ -325,9 +325,9 @@ class TwoBodiesWearCase(WearCase):
         along, across = self.size
         return along, 1.0 if self.line else across
 
-    def doubts(self) -> Iterator[str]:
-        yield from super().doubts()
-        yield from _doubts(self)
+    def plausibility_warnings(self) -> Iterator[str]:
+        yield from super().plausibility_warnings()
+        yield from _warnings_about(self)
 
 
 class BodiesWearCase(TwoBodiesWearCase):
@@ -414,7 +414,7 @@ def _in_words(path: LoadPath | LineLoadPath, force: str) -> str:
     return f"{', '.join(path.ranges())} in {steps}"
 
 
-def _doubts(case: TwoBodiesWearCase) -> Iterator[str]:
+def _warnings_about(case: TwoBodiesWearCase) -> Iterator[str]:
     """Yield plausibility warnings about loads, stroke and heights of a file."""
     bodies = case.materials.body_1, case.materials.body_2
     table, simple = case.load_path.table(), isinstance(case.load_path, Stroke)
@@ -429,6 +429,6 @@ def _doubts(case: TwoBodiesWearCase) -> Iterator[str]:
         yield from long_stroke(f"load_path{'.stroke' if simple else ''}", stroke, width)
     unit = "N/mm" if case.line else "N"
     yield from about_shear("load_path", table, case.friction.coefficient, unit)
-    yield from case.surface_doubts()
+    yield from case.surface_warnings()
     if isinstance(case.structure, Heights):
         yield from heights("structure.file", read_heights(case.structure.file), sides)

@@ -22,8 +22,8 @@ from workflow.analyses.wear.case.sections import (
     check_shares,
 )
 from workflow.analyses.wear.structures.dovetail.flank_surfaces import MeasuredFlanks
-from workflow.case.doubts import pressed
 from workflow.case.fields import AUTO, Auto, OrAuto, Quantity, Whole
+from workflow.case.plausibility import pressed
 from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry, together
 from workflow.case.text.plain import plain, shares
 
@@ -403,8 +403,8 @@ class DovetailCase(FiniteElementCase):
             grid = self._flank_grid(name)
             yield ScannedFace(name, f"{SURFACES}.{name}", surfaces, grid, faces[name])
 
-    def told_of_nodes(self) -> Iterator[str]:
-        yield from super().told_of_nodes()
+    def remarks_on_nodes(self) -> Iterator[str]:
+        yield from super().remarks_on_nodes()
         if self.structure.surfaces is not None and self.structure.dimension == 3:
             yield (
                 "structure.surfaces: the section that chooses increments and estimates the error "
@@ -419,8 +419,8 @@ class DovetailCase(FiniteElementCase):
     def face_sides(self) -> tuple[float, float]:
         return self.structure.face_width, self.structure.slot_length
 
-    def doubts(self) -> Iterator[str]:
-        yield from super().doubts()
+    def plausibility_warnings(self) -> Iterator[str]:
+        yield from super().plausibility_warnings()
         width, length = self.face_sides()
         pressure = self._pull / (2.0 * width * length * cos(self.structure.flank_angle))
         yield from pressed("load_path", pressure, self.yields)
@@ -432,7 +432,7 @@ class DovetailCase(FiniteElementCase):
                 f"a flank: it exceeds the pull of {plain(self._pull, 'N')} on half of the neck, "
                 f"{plain(arm, 'mm')}"
             )
-        yield from self.surface_doubts()
+        yield from self.surface_warnings()
 
     @property
     def cores(self) -> int:

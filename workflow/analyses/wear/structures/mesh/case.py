@@ -54,14 +54,14 @@ from workflow.analyses.wear.structures.mesh.mesh_file import (
     LengthName,
     MeshFile,
     lengths_outline,
-    size_doubts,
+    size_warnings,
 )
 from workflow.analyses.wear.structures.mesh.pretension import check_bolts
 from workflow.analyses.wear.structures.mesh.temperatures import check_temperatures
 from workflow.case.changing import changed
 from workflow.case.fields import AUTO
 from workflow.case.sections import Length, Section, Title, disagreement, entry
-from workflow.case.text.plain import counted, listed, told_of_body
+from workflow.case.text.plain import body_text, counted, listed
 from workflow.models.faces import face_size
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ class MeshCase(FiniteElementCase):
             ),
             *(row for face in self.scanned() for row in face.outline()),
             *(
-                ("material", f"{body.name}: {told_of_body(body.material)}")
+                ("material", f"{body.name}: {body_text(body.material)}")
                 for body in structure.other_bodies
             ),
             *(("contact", text) for pair in structure.contacts if (text := own_terms(pair))),
@@ -258,23 +258,23 @@ class MeshCase(FiniteElementCase):
             *(("load", load.text) for load in structure.loads),
         ]
 
-    def doubts(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[str]:
         """Yield plausibility warnings about file, lengths, elements and contacts."""
-        yield from super().doubts()
+        yield from super().plausibility_warnings()
         imported = self.structure.read(self.mesh.size)
-        if left := imported.left:
+        if left := imported.unused:
             yield (
                 f"structure.file: {counted(len(left), 'line')} with loads, supports, contacts or "
                 f"materials not used, the first is {left[0]}; fretscale describe lists all, and "
                 "--case writes them as a case"
             )
-        yield from size_doubts(imported, self.solids, self.structure.loads)
+        yield from size_warnings(imported, self.solids, self.structure.loads)
         mesh = self.structure.mesh(self.mesh.size, self.mesh.order)
-        yield from (f"mesh.order: {doubt}" for doubt in folded_elements(mesh, imported))
+        yield from (f"mesh.order: {warning}" for warning in folded_elements(mesh, imported))
         for index, interface in enumerate(mesh.interfaces):
-            for doubt in filter(None, (hardly_met(mesh, interface), apart(mesh, interface))):
-                yield f"structure.contacts.{index}: {doubt}"
-        yield from self.surface_doubts()
+            for warning in filter(None, (hardly_met(mesh, interface), apart(mesh, interface))):
+                yield f"structure.contacts.{index}: {warning}"
+        yield from self.surface_warnings()
 
     @model_validator(mode="after")
     def _size_is_for_cad(self) -> MeshCase:

@@ -14,13 +14,13 @@ from workflow.analyses.wear.case.sections import Density, Laws, Solid, TwoBodies
 from workflow.analyses.wear.case.worn_bodies import BodyWear, wearing
 from workflow.analyses.wear.structures.mesh.load import Direction, Name
 from workflow.analyses.wear.structures.mesh.temperatures import Expansion
-from workflow.case.fields import OrAlone
+from workflow.case.fields import ScalarOrList
 from workflow.case.sections import FaceCells, Section, disagreement, entry
 
 if TYPE_CHECKING:
     from fe_models import imported_structure as fe
 
-Faces = Annotated[tuple[Name, ...], OrAlone()]
+Faces = Annotated[tuple[Name, ...], ScalarOrList()]
 
 
 class MeshMaterial(Solid):

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import model_validator
 
 from workflow.analyses.wear.structures.mesh.load import Coordinate, Direction, Name
-from workflow.case.fields import OrAlone, Whole
+from workflow.case.fields import ScalarOrList, Whole
 from workflow.case.sections import Section, disagreement, entry
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # Distance between matching cuts [mm] up to which they count as exact and nothing is reported.
 EXACT = 1e-9
 
-Boundaries = Annotated[tuple[Name, ...], OrAlone()]
+Boundaries = Annotated[tuple[Name, ...], ScalarOrList()]
 
 
 class CyclicCuts(Section):
@@ -67,7 +67,7 @@ class CyclicCuts(Section):
         parts = []
         for pair in (pair for cuts in sector_cuts(mesh, [self.described()]) for pair in cuts):
             meet = "match node to node" if pair.matched else "do not match and are tied by a mortar"
-            off = f", {1e3 * pair.apart:.2g} µm off" if pair.apart > EXACT else ""
+            off = f", {1e3 * pair.max_distance:.2g} µm off" if pair.max_distance > EXACT else ""
             parts.append(f"{low} and {high} {meet}{off}")
         return f"one of {self.sectors}: {', '.join(parts)}"
 
@@ -95,9 +95,9 @@ def check_sector(
     :class:`MeshError` to a case entry.
     """
     from fe_models.cyclic.sector import (
-        check_alike,
         check_cuts,
         check_off_cuts,
+        check_same_in_all_sectors,
         check_temperatures,
         sector_cuts,
     )
@@ -116,5 +116,5 @@ def check_sector(
     for index, load in enumerate(structure.loads):
         with pointing_at(f"structure.loads.{index}"):
             described = load.described()
-            check_alike(mesh.bodies, described, cyclic)
+            check_same_in_all_sectors(mesh.bodies, described, cyclic)
             check_temperatures(mesh, numbers, described, found)

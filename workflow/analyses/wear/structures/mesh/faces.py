@@ -73,7 +73,7 @@ def _curved(interface: Interface) -> str:
         if surface is None or round(bulge, 9) == 0.0 == surface.straight:
             continue
         fit = f"fitted through nodes, to {1e3 * surface.error:.2g} µm"
-        how = "by nodes on edges" if surface.left is None else fit
+        how = "by nodes on edges" if surface.form_error is None else fit
         bent = f", {counted(surface.straight, 'edge')} left straight" * (surface.straight > 0)
         parts.append(f"body {number} up to {1e3 * bulge:.3g} µm off its facets ({how}{bent})")
     return f", {' and '.join(parts)}" if parts else ""

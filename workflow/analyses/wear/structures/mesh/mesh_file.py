@@ -20,8 +20,8 @@ from workflow.analyses.wear.structures.mesh.loads import (
     MomentLoad,
     RotationLoad,
 )
-from workflow.case.doubts import WEAK, pressed
 from workflow.case.fields import File, Word
+from workflow.case.plausibility import WEAK, pressed
 from workflow.case.text.plain import plain
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def lengths_outline(imported: ImportedMesh, names: tuple[str, ...]) -> str:
     return f"{imported.unit}; bodies within {extent(points)}"
 
 
-def size_doubts(
+def size_warnings(
     imported: ImportedMesh, solids: Mapping[str, MeshMaterial], loads: Sequence[MeshLoad]
 ) -> Iterator[str]:
     """Yield plausibility warnings about sizes of bodies, by themselves and with the loads."""
@@ -76,12 +76,14 @@ def size_doubts(
 def _unusual(imported: ImportedMesh, side: float) -> str:
     """Return a description of an unusual size, and a unit that would make it usual."""
     least, most = (plain(usual, "mm") for usual in USUAL)
-    told = f"bodies of {plain(side, 'mm', 4)}, lengths {imported.unit}; usual: {least} to {most}"
+    reported = (
+        f"bodies of {plain(side, 'mm', 4)}, lengths {imported.unit}; usual: {least} to {most}"
+    )
     for name in UNITS:
         meant = side / imported.unit.size * SIZES[name]
         if USUAL[0] <= meant <= USUAL[1]:
-            return f"{told}; {plain(meant, 'mm', 4)} if they are in {name}"
-    return told
+            return f"{reported}; {plain(meant, 'mm', 4)} if they are in {name}"
+    return reported
 
 
 def _loads(

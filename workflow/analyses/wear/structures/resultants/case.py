@@ -18,9 +18,9 @@ from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.case.sections import ContactSection, TwoBodies, WearSection, check_rows
 from workflow.analyses.wear.structures.resultants.faces import FaceError
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
-from workflow.case.doubts import pressed, uneven_cells
-from workflow.case.fields import File, OrAlone, Quantity, shown, split_dataset
+from workflow.case.fields import File, Quantity, ScalarOrList, shown, split_dataset
 from workflow.case.files.input_files import InputFileError
+from workflow.case.plausibility import pressed, uneven_cells
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 from workflow.case.text.plain import between, plain, shape_in_words
 
@@ -31,7 +31,7 @@ NOTHING = 1e-9
 
 Place = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
 Direction = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
-Sizes = Annotated[tuple[Length, ...], OrAlone()]
+Sizes = Annotated[tuple[Length, ...], ScalarOrList()]
 NodeFile = Annotated[str, File((".csv",))]
 
 # --- faces --------------------------------------------------------------------------------------
@@ -276,8 +276,8 @@ class ResultantsCase(WearCase):
         sides = f"{size[0]:g} mm" if self.structure.line else f"{size[0]:g} x {size[1]:g} mm"
         return f"{sides}, {unnamed if gap is None else shape_in_words(gap)}"
 
-    def doubts(self) -> Iterator[str]:
-        yield from super().doubts()
+    def plausibility_warnings(self) -> Iterator[str]:
+        yield from super().plausibility_warnings()
         for name, imported in self.loads().items():
             x, y = sides = self.structure.size_of(name)
             yield from pressed(
@@ -285,7 +285,7 @@ class ResultantsCase(WearCase):
             )
             if not self.structure.line:
                 yield from uneven_cells(sides, self.cells)
-        yield from self.surface_doubts()
+        yield from self.surface_warnings()
 
     @model_validator(mode="after")
     def _loads_can_be_used(self) -> ResultantsCase:
@@ -365,11 +365,11 @@ class ResultantsCase(WearCase):
 def _ranges(loads: LoadHistory, unit: str) -> str:
     """Return the ranges of P, and of Qx and Qy if they act, in a cycle, in words."""
     low, high = float(loads.P.min()), float(loads.P.max())
-    told = [f"P {between(low, high, unit) if low else f'up to {plain(high, unit)}'}"]
+    reported = [f"P {between(low, high, unit) if low else f'up to {plain(high, unit)}'}"]
     if low == high:
-        told = [f"P {plain(high, unit)}"]
+        reported = [f"P {plain(high, unit)}"]
     for name in ("Qx", "Qy"):
         force = getattr(loads, name)
         if np.abs(force).max() > NOTHING * loads.P.max():
-            told.append(f"{name} {between(force.min(), force.max(), unit)}")
-    return ", ".join(told)
+            reported.append(f"{name} {between(force.min(), force.max(), unit)}")
+    return ", ".join(reported)

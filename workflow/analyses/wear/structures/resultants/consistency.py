@@ -10,7 +10,7 @@ import numpy as np
 
 from sa_solver.tangential.gross_slip import GROSS_SHARE
 from sa_solver.types import Array, LoadHistory, Mask
-from workflow.analyses.wear.case.sections import SHARES_APART
+from workflow.analyses.wear.case.sections import SHARES_DIFFERENCE
 from workflow.analyses.wear.structures.resultants.imported import COLUMNS
 from workflow.case.files.input_files import InputFileError
 
@@ -56,7 +56,7 @@ def _check_columns(columns: dict[str, Array], bounds: Bounds, refusal: Refusal) 
         meaning = "body 1 presses on body 2" if name == "P" else "energy is lost, not gained"
         low = 0.0 if name == "P" else -remainder[name]
         _refuse_where(columns[name] < low, name, "negative", f"0 or more, {meaning}", refusal)
-    _check_apart(columns, remainder, refusal)
+    _check_separated(columns, remainder, refusal)
     if bounds.line:
         _check_line(columns, refusal)
     if bounds.friction is not None:
@@ -103,7 +103,7 @@ def _mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, An
     _refuse_where((share < 0.0) | (share > 1.0), "share", "out of range", "0 to 1", refusal)
     _refuse_where(share != share[begins][block], "share", "not as above", "one in a block", refusal)
     total = float(share[begins].sum())
-    if abs(total - 1.0) > SHARES_APART:
+    if abs(total - 1.0) > SHARES_DIFFERENCE:
         wrong = f"the shares of all blocks add up to {total:g}"
         raise refusal(len(share) - 1, "share", wrong, "to 1")
     return {"block": block, "share": share}
@@ -114,7 +114,9 @@ def _refuse_where(wrong: Mask, column: str, what: str, allowed: str, refusal: Re
         raise refusal(increment, column, what, allowed)
 
 
-def _check_apart(columns: dict[str, Array], remainder: dict[str, float], refusal: Refusal) -> None:
+def _check_separated(
+    columns: dict[str, Array], remainder: dict[str, float], refusal: Refusal
+) -> None:
     """Refuse forces, moments and energies where the bodies are apart."""
     apart = columns["P"] == 0.0
     for name in COLUMNS[1:]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.contact.load_table import LoadTable
-from workflow.case.doubts import pressed
+from workflow.case.plausibility import pressed
 from workflow.case.sections import ElasticSection
 from workflow.case.text.plain import plain
 

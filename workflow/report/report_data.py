@@ -10,7 +10,7 @@ from workflow.case.sections import Case
 
 
 @dataclass(frozen=True)
-class ToldRun:
+class ReportData:
     """Finished run with the data for its report.
 
     ``case_text`` is the case as run and ``kind`` the name of its kind. ``input_files`` are digests

@@ -2,7 +2,7 @@
 
 This module holds the plausible range of single entries. The ranges are wider than anything that
 machines, rigs or laboratories have. Each kind of case checks combinations of its entries itself
-(``Case.doubts``).
+(``Case.plausibility_warnings``).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pydantic import BaseModel
 from sa_solver.types import Array
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case, entry_of
-from workflow.case.text.plain import between, plain, said_in
+from workflow.case.text.plain import between, display_unit, plain
 
 # Aspect ratio of cells above which a grid wastes most of them.
 SQUARE = 5.0
@@ -117,11 +117,11 @@ MEANT: dict[str, tuple[tuple[str, float], ...]] = {
 }
 
 
-def doubts_of(case: Case) -> Iterator[str]:
+def plausibility_warnings_of(case: Case) -> Iterator[str]:
     """Yield a plausibility warning for each value, or combination of values, that is unlikely."""
     yield from _unusual(case)
     yield from _hardly_round(case)
-    yield from case.doubts()
+    yield from case.plausibility_warnings()
 
 
 def _unusual(case: Case) -> Iterator[str]:
@@ -170,7 +170,7 @@ def _quantities(section: BaseModel, path: str = "") -> Iterator[tuple[str, float
 
 def _question(number: float, usual: Usual) -> str:
     """Return the value that was probably meant, as a question; empty if no unit is plausible."""
-    for written in (number / said_in(number, usual.unit)[0], number):
+    for written in (number / display_unit(number, usual.unit)[0], number):
         for unit, size in MEANT.get(usual.unit, ()):
             if usual.low <= written * size <= usual.high and written * size != number:
                 return f"; {written:.6g} {unit} meant?"

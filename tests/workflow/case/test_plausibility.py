@@ -13,10 +13,10 @@ import pytest
 from click.testing import CliRunner
 
 from sa_solver.reference.hertz import HertzCylinder, HertzSphere
-from workflow.analyses.rig.doubts import modes
+from workflow.analyses.rig.plausibility import modes
 from workflow.analyses.rig.structure import Rig
-from workflow.case.doubts import SQUARE, USUAL, doubts_of, hertz, uneven_cells
 from workflow.case.fields import Quantity
+from workflow.case.plausibility import SQUARE, USUAL, hertz, plausibility_warnings_of, uneven_cells
 from workflow.case.sections import Section, entry_of, sections_of
 from workflow.case.text.plain import between, plain
 from workflow.cli import cli
@@ -27,7 +27,7 @@ CASES = sorted(Path("cases").glob("*.yaml"))
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
 def test_nothing_is_doubted_of_our_cases(path: Path) -> None:
-    assert list(doubts_of(load_case(path))) == []
+    assert list(plausibility_warnings_of(load_case(path))) == []
 
 
 @pytest.mark.parametrize("kind", kinds())
@@ -35,7 +35,7 @@ def test_nothing_is_doubted_of_templates(kind: str, template_files: Path, tmp_pa
     shutil.copytree(template_files, tmp_path, dirs_exist_ok=True)
     path = tmp_path / "mine.yaml"
     path.write_text(template(kind), encoding="utf-8")
-    assert list(doubts_of(load_case(path))) == []
+    assert list(plausibility_warnings_of(load_case(path))) == []
 
 
 LIGHT = "load_path={legs: [{P: 50, Qx: 1e-3}, {Qx: -1e-3}]}"
@@ -89,7 +89,7 @@ SLIPS = [
 def told_of(kind: str, slip: str, folder: Path) -> list[str]:
     path = folder / "mine.yaml"
     path.write_text(template(kind), encoding="utf-8")
-    return list(doubts_of(load_case(path, [slip, *BESIDE.get(slip, ())])))
+    return list(plausibility_warnings_of(load_case(path, [slip, *BESIDE.get(slip, ())])))
 
 
 # Further changes that make a case valid.
@@ -104,12 +104,14 @@ BESIDE = {
 @pytest.mark.parametrize(("kind", "slip", "words"), SLIPS, ids=[slip for _, slip, _ in SLIPS])
 def test_a_slip_is_doubted(kind: str, slip: str, words: str, tmp_path: Path) -> None:
     """The warning names the entry, on one line."""
-    told = [doubt for doubt in told_of(kind, slip, tmp_path) if words in doubt]
-    assert told, told_of(kind, slip, tmp_path)
+    reported = [warning for warning in told_of(kind, slip, tmp_path) if words in warning]
+    assert reported, told_of(kind, slip, tmp_path)
     # What two entries say together is told of one of them.
     together = "no mode of the rig", "smaller than the contact"
-    assert slip.replace("=", ".").split(".")[0] in told[0] or any(w in told[0] for w in together)
-    assert "\n" not in told[0]
+    assert slip.replace("=", ".").split(".")[0] in reported[0] or any(
+        w in reported[0] for w in together
+    )
+    assert "\n" not in reported[0]
 
 
 @pytest.mark.parametrize(
@@ -120,8 +122,10 @@ def test_a_slip_is_doubted(kind: str, slip: str, words: str, tmp_path: Path) -> 
     ],
 )
 def test_a_slip_beside_a_mesh_is_doubted(slip: str, words: str, folders: dict[str, Path]) -> None:
-    (told,) = doubts_of(parse_case(template("mesh"), str(folders["mesh"] / "case.yaml"), [slip]))
-    assert words in told
+    (reported,) = plausibility_warnings_of(
+        parse_case(template("mesh"), str(folders["mesh"] / "case.yaml"), [slip])
+    )
+    assert words in reported
 
 
 def test_modes_are_those_of_masses_in_a_row() -> None:
@@ -142,10 +146,10 @@ def test_heights_in_another_unit_are_doubted(scale: float, words: str, tmp_path:
     slip = "contact={grid: [16, 16], size: [1 mm, 1 mm]}"
     path = tmp_path / "mine.yaml"
     path.write_text(template("bodies"), encoding="utf-8")
-    assert list(doubts_of(load_case(path, [*heights_case, slip]))) == []
+    assert list(plausibility_warnings_of(load_case(path, [*heights_case, slip]))) == []
     np.save(tmp_path / "gap.npy", scale * heights)
-    (told,) = doubts_of(load_case(path, [*heights_case, slip]))
-    assert words in told
+    (reported,) = plausibility_warnings_of(load_case(path, [*heights_case, slip]))
+    assert words in reported
 
 
 def test_all_that_is_usual_is_usual_of_some_entry() -> None:
@@ -184,8 +188,8 @@ def test_cells_are_uneven_beyond_a_limit() -> None:
 
 def test_a_check_tells_the_scene_and_doubts_and_still_is_right() -> None:
     slip = "materials.blade.young=210 MPa"
-    told = CliRunner().invoke(cli, ["check", "cases/dovetail.yaml", "--set", slip])
-    assert told.exit_code == 0
+    reported = CliRunner().invoke(cli, ["check", "cases/dovetail.yaml", "--set", slip])
+    assert reported.exit_code == 0
     for words in (
         "6000 rpm, airfoil 0.8 kg at 400 mm: 126.3 kN",
         "disk: young 115 GPa, poisson 0.29, yield stress 900 MPa, density 4430 kg/m³",
@@ -193,11 +197,11 @@ def test_a_check_tells_the_scene_and_doubts_and_still_is_right() -> None:
         "cells of 85.94 µm x 0.2344 mm",
         "\nwarning: materials.blade.young: 210 MPa",
     ):
-        assert words in told.stdout
+        assert words in reported.stdout
 
 
 @pytest.mark.parametrize(
-    ("number", "unit", "said"),
+    ("number", "unit", "printed"),
     [
         (115e3, "MPa", "115 GPa"),
         (0.014, "mm", "14 µm"),
@@ -205,8 +209,8 @@ def test_a_check_tells_the_scene_and_doubts_and_still_is_right() -> None:
         (628.318530718, "rad/s", "6000 rpm"),
     ],
 )
-def test_numbers_are_said_in_plain_units(number: float, unit: str, said: str) -> None:
-    assert plain(number, unit) == said
+def test_numbers_are_said_in_plain_units(number: float, unit: str, printed: str) -> None:
+    assert plain(number, unit) == printed
 
 
 def test_a_range_is_said_in_one_unit() -> None:

@@ -14,7 +14,7 @@ from tests.workflow.rig.test_reduced_rig import TWO_MASSES
 from tests.workflow.vibration.time_scenes import MASS, STIFF, refused, run
 from workflow.analyses.rig.bodies import matrix_body
 from workflow.analyses.rig.building import rig_model
-from workflow.case.doubts import doubts_of
+from workflow.case.plausibility import plausibility_warnings_of
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case
@@ -59,7 +59,7 @@ def rig_of(folder: Path, *overrides: str, text: str = OWN):
     return rig_model(case.structure, case.joint, None, Reporter(folder / "run.log"))
 
 
-def told(folder: Path, *overrides: str, text: str = OWN) -> str:
+def reported(folder: Path, *overrides: str, text: str = OWN) -> str:
     """Return the line that refuses a case."""
     with pytest.raises(CaseError) as refusal:
         parse_case(text, str(folder / "case.yaml"), overrides)
@@ -203,10 +203,13 @@ def test_places_are_known_before_large_matrices_are_reduced(two, monkeypatch, re
         monkeypatch.setattr(matrix_body, "SMALL", 1)
     driven = ("forces=", "structure.driven=", *retained)
     places = [f"structure.{name}.points=block" for name in ("joints.0", "seen")]
-    said = told(two, *driven, *places, SHAKEN.format("tip"))
-    assert "excitation.forces.0.points: 'tip': no such point; allowed: block" in said
+    printed = reported(two, *driven, *places, SHAKEN.format("tip"))
+    assert "excitation.forces.0.points: 'tip': no such point; allowed: block" in printed
     dashpot = "structure.damping={dashpots: [{points: block, direction: y, coefficient: 1}]}"
-    assert "block does not move along y; allowed: x" in told(two, *places, *retained, dashpot)[:400]
+    assert (
+        "block does not move along y; allowed: x"
+        in reported(two, *places, *retained, dashpot)[:400]
+    )
     parse_case(OWN, str(two / "case.yaml"), [*driven, *places, SHAKEN.format("block")])
 
 
@@ -292,7 +295,7 @@ def test_units_that_are_hardly_meant_are_doubted(two):
     ],
 )  # fmt: skip
 def test_wrong_entries_are_refused(two, override, words):
-    assert words.format(folder=two) in told(two, override)
+    assert words.format(folder=two) in reported(two, override)
 
 
 def test_matrices_by_other_names_are_offered(two):
@@ -300,14 +303,14 @@ def test_matrices_by_other_names_are_offered(two):
     given = {"K": STIFF, "M": MASS, "D": 1e-4 * STIFF, "B": np.eye(2)[:, :1], "shapes": np.eye(3)}
     scipy.io.savemat(two / "plant.mat", {**given, "title": "two masses"})
     file = "structure.matrices.file=plant.mat"
-    (doubt,) = doubts_of(parse_case(OWN, str(two / "case.yaml"), [file]))
-    assert doubt.startswith(
+    (warned,) = plausibility_warnings_of(parse_case(OWN, str(two / "case.yaml"), [file]))
+    assert warned.startswith(
         "structure.matrices.damping: no matrix with a usual name; plant.mat:D could"
     )
-    line = told(two, file, "structure.driven={load: 1}")
+    line = reported(two, file, "structure.driven={load: 1}")
     assert "no loads have a usual name, or matrices.loads: plant.mat:B" in line
     taken = [file, "structure.matrices.damping=plant.mat:D", "structure.matrices.loads=plant.mat:B"]
-    assert not list(doubts_of(parse_case(OWN, str(two / "case.yaml"), taken)))
+    assert not list(plausibility_warnings_of(parse_case(OWN, str(two / "case.yaml"), taken)))
     difference = rig_of(two, *taken).model.damping - rig_of(two, file).model.damping
     np.testing.assert_allclose(difference, 1e-4 * STIFF, rtol=1e-9)
     np.testing.assert_array_equal(rig_of(two, *taken, "structure.driven={load: 1}").driven, [1, 0])
@@ -329,7 +332,7 @@ def test_matrices_by_other_names_are_offered(two):
 )
 def test_wrong_unknowns_are_refused(two, text, words):
     (two / "unknowns.csv").write_text(text, encoding="utf-8")
-    assert words in told(two)
+    assert words in reported(two)
 
 
 @pytest.mark.parametrize(
@@ -345,19 +348,19 @@ def test_wrong_unknowns_are_refused(two, text, words):
 )
 def test_wrong_matrices_are_refused(two, matrices, key, words):
     np.savez(two / "two.npz", **matrices)
-    line = told(two)
+    line = reported(two)
     assert f"structure.matrices.{'file' if key == 'mass' else key}: " in line
     assert words in line
 
 
 def test_files_that_are_none_end_in_one_line(two):
     (two / "two.npz").write_bytes(b"PK\x03\x04 nothing")
-    assert "two.npz: cannot be read (" in told(two)
+    assert "two.npz: cannot be read (" in reported(two)
     with h5py.File(two / "out.h5", "w") as file:
         file["K"] = h5py.ExternalLink("other.h5", "/K")
-    assert "/K: a link to another file" in told(two, "structure.matrices.file=out.h5")
+    assert "/K: a link to another file" in reported(two, "structure.matrices.file=out.h5")
     (two / "k.mtx").write_text("1,1, 1,1, 3.0\n1,1, 2,x, 4.0\n", encoding="utf-8")
-    line = told(two, "structure.matrices.stiffness=k.mtx")
+    line = reported(two, "structure.matrices.stiffness=k.mtx")
     assert f"{two / 'k.mtx'}:2: 'x' is not a number" in line
 
 

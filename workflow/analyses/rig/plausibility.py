@@ -48,7 +48,7 @@ def about_matrices(structure: Section, highest: float) -> Iterator[str]:
     ``highest`` is the highest frequency of the motion [Hz].
     """
     if isinstance(structure, MatrixBody):
-        yield from structure.doubts(highest)
+        yield from structure.plausibility_warnings(highest)
 
 
 def _stretches(structure: RowOfMasses | FrictionRig, shared: bool) -> Array:

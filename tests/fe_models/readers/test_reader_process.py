@@ -12,7 +12,7 @@ import pytest
 from fe_models.geometry.imported import read_bodies
 from fe_models.meshes.gmsh_session import gmsh_model
 from fe_models.meshes.structure_mesh import MeshError
-from fe_models.readers.reader_process import read_apart
+from fe_models.readers.reader_process import read_in_subprocess
 
 posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 PATIENCE = 120.0
@@ -40,10 +40,10 @@ def test_a_damaged_solid_is_one_line(boxes, tmp_path):
     """Check a file with an invalid entity, which crashes OpenCASCADE."""
     damaged = tmp_path / "damaged.step"
     damaged.write_text(boxes.read_text().replace("FACE_BOUND", "FACE_BO ND", 1))
-    with pytest.raises(MeshError) as told:
+    with pytest.raises(MeshError) as reported:
         read_bodies(damaged, 1.0)
-    assert str(told.value).startswith(f"{damaged}: gmsh ")
-    assert "\n" not in str(told.value)
+    assert str(reported.value).startswith(f"{damaged}: gmsh ")
+    assert "\n" not in str(reported.value)
 
 
 @posix_only
@@ -57,14 +57,16 @@ def test_a_damaged_solid_is_one_line(boxes, tmp_path):
 )
 def test_the_end_of_the_process_is_told(ending, number, words):
     with pytest.raises(MeshError, match=f"^{number}: {words}"):
-        read_apart(ending, number)
+        read_in_subprocess(ending, number)
 
 
 @posix_only
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_the_process_ends_with_whoever_reads():
     """Check that the reading process ends with its parent, however that ends."""
-    reading = "from fe_models.readers.reader_process import read_apart; read_apart(time.sleep, 99)"
+    reading = (
+        "from fe_models.readers.reader_process import read_in_subprocess as r; r(time.sleep, 99)"
+    )
     with subprocess.Popen([sys.executable, "-c", f"import time; {reading}"]) as process:
         below = Path(f"/proc/{process.pid}/task/{process.pid}/children")
         end = time.monotonic() + PATIENCE
