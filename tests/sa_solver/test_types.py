@@ -78,7 +78,7 @@ def test_a_grid_without_area_is_refused(shape, pitch):
 
 @pytest.mark.parametrize(("shape", "pitch"), [((4, 2), (0.1, 1.0)), ((4, 1), (0.1, 0.5))])
 def test_a_line_grid_has_one_row_one_millimetre_long(shape, pitch):
-    with pytest.raises(ValueError, match=r"Grid\.strips"):
+    with pytest.raises(ValueError, match=r"Grid\.line_contact"):
         Grid(shape, pitch, line=True)
 
 

@@ -59,7 +59,7 @@ WRONG = [
     ("shear without friction", BALL, "friction: {coefficient: 0.7}\n", "", "friction",
      "missing, but load_path has Qx"),
     ("unlike bodies without friction", BALL.replace(*RIGID_2).replace("Qx: 210 N", "Mx: 1 N*mm"),
-     "friction: {coefficient: 0.7}\n", "", "friction", "missing, but unlike bodies rub"),
+     "friction: {coefficient: 0.7}\n", "", "friction", "missing, but dissimilar bodies rub"),
 ]  # fmt: skip
 
 
@@ -186,7 +186,8 @@ def test_wrong_path_file_is_told_with_both_lines(tmp_path, content, line, words)
 
 
 @pytest.mark.parametrize(
-    ("content", "words"), [("Qx\n1\n", "neither P nor approach"), ("P,approach\n1,0\n", "beside P")]
+    ("content", "words"),
+    [("Qx\n1\n", "neither P nor approach"), ("P,approach\n1,0\n", "together with P")],
 )
 def test_columns_of_a_path_file_must_agree(tmp_path, content, words):
     (tmp_path / "history.csv").write_text(content, encoding="utf-8")

@@ -113,8 +113,8 @@ def test_pads_pressed_evenly_are_closed_evenly_if_contacts_share_by_area(files):
         ("structure.specimens=nothing.yaml", "nothing.yaml': no such file"),
         ("joint={law: jenkins, normal_load: 60, friction: 1, stiffness: 1}", "friction_contact"),
         ("joint={law: friction_contact, normal_load: 0, gap: 1 um, friction: 1, stiffness: 1, "
-         "normal_stiffness: 1}", "allowed: their own form"),
-        ("mass=1", "given beside friction_rig"),
+         "normal_stiffness: 1}", "given with specimens"),
+        ("mass=1", "given with friction_rig"),
     ],
 )  # fmt: skip
 def test_mistakes_are_told_in_one_line(files, override, words):

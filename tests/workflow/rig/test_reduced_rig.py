@@ -299,8 +299,8 @@ def test_memory_grows_with_the_body(specimen):
 @pytest.mark.parametrize(
     ("override", "words"),
     [
-        ("excitation.mass=1", "given beside a reduced body; allowed: structure.driven"),
-        ("structure.body=1", "given beside a single body"),
+        ("excitation.mass=1", "given with a reduced body; allowed: structure.driven"),
+        ("structure.body=1", "given with a file of a single body"),
         ("structure.joints=[]", "a list of at least 1, with points, direction below it"),
         ("structure.joints.0.direction=w", "'x', 'y', 'z'"),
         ("joint.gap=1 um", "given with a normal load"),
@@ -324,7 +324,7 @@ def test_a_row_of_masses_has_no_friction_contact():
         ("structure.driven.points=nose", "--set structure.driven.points=nose: 'nose': no such"),
         ("structure.joints.0.points=pad 10", "joints.0.points=pad 10: 'pad 10': no such point"),
         ("structure.joints.0.against=ring", "against=ring: 4 points for 9; allowed: as many"),
-        ("structure.joints.0.against=pad", "pad 1 against itself"),
+        ("structure.joints.0.against=pad", "pad 1 joined to itself"),
         ("structure.masses.0.points=rim", "'rim': no such point"),
     ],
 )  # fmt: skip

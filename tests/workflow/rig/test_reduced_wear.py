@@ -414,10 +414,10 @@ def test_a_run_leaves_nodes_in_tables_results_and_paraview(ended):
     ("overrides", "printed"),
     [
         (["joint.nodes="], "joint.area: missing; allowed: area of all contacts together"),
-        (["joint.area=1 mm^2"], "given beside areas in"),
-        (["joint.pressed="], "without pressed, so that each contact carries a load"),
+        (["joint.area=1 mm^2"], "given with areas in"),
+        (["joint.pressed="], "without pressed every contact carries a load"),
         (["wear.frequency="], "wear.frequency=: missing; allowed: frequency, or at_resonance:"),
-        (["wear.at_resonance=true"], "given beside at_resonance"),
+        (["wear.at_resonance=true"], "given with at_resonance"),
         (["wear.body_1.coefficient=0", "wear.body_2.coefficient=0"], "0 for both bodies"),
         (["joint.friction=0"], "joint.friction"),
         (["wear.cycles=[10, 5]"], "wear.cycles=[10, 5]: not ascending"),

@@ -122,7 +122,7 @@ def results_of(out: Path) -> dict[str, object]:
 def counted(out: Path) -> tuple[int, int]:
     """Return the steps that the last process of a run has computed, and those it has restored."""
     log = (out / "run.log").read_text("utf-8")
-    *_, (computed, taken) = re.findall(r"steps: (\d+) computed, (\d+) taken", log)
+    *_, (computed, taken) = re.findall(r"steps: (\d+) computed, (\d+) resumed", log)
     return int(computed), int(taken)
 
 

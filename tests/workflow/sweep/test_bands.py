@@ -130,6 +130,9 @@ def test_curves_of_the_runs_are_drawn_with_bands(tmp_path):
             for name, values in {"energy": energy, **wear}.items():
                 file[f"evolution/{name}"] = values
                 file[f"evolution/{name}"].attrs["unit"] = "N mm" if name == "energy" else "1"
+            file["evolution/energy"].make_scale("energy")
+            for name in wear:
+                file[f"evolution/{name}"].dims[0].attach_scale(file["evolution/energy"])
         rows.append(SweepRow(SweepRun(f"{number}", {}), Finished(None, root, {})))
     rows.append(
         SweepRow(SweepRun("broken", {}), Finished(None, tmp_path / "broken", None, "it broke"))

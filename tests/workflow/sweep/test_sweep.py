@@ -154,7 +154,7 @@ def test_example_is_a_sweep():
         ("+{values: [0.5], range: {from: 1, to: 2, count: 3}}", 3, "values and range given"),
         ("+{range: {from: 0.1, count: 3}}", 3, "range.to: missing; allowed: last value"),
         ("+{range: {from: 0.1, to: 0.2}}", 3, "range.count: missing; allowed: number of values"),
-        ("+{range: {from: 1 mm, to: 2, count: 3}}", 3, "2 beside '1 mm'; allowed: the same unit"),
+        ("+{range: {from: 1 mm, to: 2, count: 3}}", 3, "2 and '1 mm'; allowed: the same unit"),
         ("+{range: {from: 0, to: 2, count: 3, scale: log}}", 3, "not both positive"),
         ("+{distribution: {kind: uniform, from: 0, to: 1}}", 3, "allowed: design: sample"),
         ("+{values: [0.5]}\nset: {friction.coefficient: 0.6}", 4, "varies as well"),

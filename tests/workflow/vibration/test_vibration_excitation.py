@@ -129,10 +129,10 @@ OPPOSED = (
     ("settings", "message"),
     [
         (["forces="], "missing; allowed: forces, or an excitation"),
-        ([f"excitation={{{ONE}}}"], "given beside an excitation; allowed: excitation.levels"),
-        (["forces=", "mass=2", f"excitation={{{ONE}}}"], "2: given beside an excitation, which"),
+        ([f"excitation={{{ONE}}}"], "given with an excitation; allowed: excitation.levels"),
+        (["forces=", "mass=2", f"excitation={{{ONE}}}"], "2: given with an excitation, which"),
         (["forces=", "excitation={levels: [1]}"], "nothing drives; allowed: forces, records or"),
-        (["forces=", f"excitation={{levels: [2, 1], {ONE}}}"], "not ascending; allowed: each"),
+        (["forces=", f"excitation={{levels: [2, 1], {ONE}}}"], "not ascending; allowed: ascending"),
         (
             ["forces=", "excitation={forces: [{points: m1, amplitude: 1, harmonic: 2}]}"],
             "no harmonic 1; allowed: a harmonic 1",

@@ -13,7 +13,7 @@ import pytest
 from tests.marks import slow
 from tests.workflow.command_line import command
 from wear.contact.interface import InterfaceState
-from workflow.analyses.wear import run as wear_run
+from workflow.analyses.wear import recording
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
@@ -363,7 +363,7 @@ def test_a_run_says_what_its_steps_leave_of_the_pressure(tmp_path) -> None:
 
 def test_many_jumps_are_warned_of(tmp_path, monkeypatch) -> None:
     """The warning appears once, with the setting that reduces the number of jumps."""
-    monkeypatch.setattr(wear_run, "MANY_JUMPS", 2)
+    monkeypatch.setattr(recording, "MANY_JUMPS", 2)
     warnings = worn_over_50_um(tmp_path / "run", "{kind: implicit, cycles: 4500}")[1]
     (line,) = (line for line in warnings if "wear jumps" in line)
     assert "about 2 more are needed" in line

@@ -285,7 +285,9 @@ def test_blocks_that_are_no_mix_are_refused(tmp_path, rows, reported):
 def test_a_share_needs_its_block(tmp_path):
     text = "P, Qx, Qy, Mx, My, Mz, Edx, Edy, share\n100, 0, 0, 0, 0, 0, 0, 0, 1\n"
     (tmp_path / "loads.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(InputFileError, match="given alone; allowed: block and share, or neither"):
+    with pytest.raises(
+        InputFileError, match="given without the other; allowed: block and share, or neither"
+    ):
         read_resultants(tmp_path / "loads.csv")
 
 

@@ -160,5 +160,9 @@ def frame_of(group: h5py.Group) -> Frame:
 
 
 def own(group: h5py.Group) -> list[str]:
-    """Return the names in a group but for links to coordinates and dimensions elsewhere."""
-    return [name for name in group if not isinstance(group.get(name, getlink=True), h5py.SoftLink)]
+    """Return the names in a group other than coordinates and dimensions of all groups."""
+    return [
+        name
+        for name in group
+        if name != DIMENSIONS and not isinstance(group.get(name, getlink=True), h5py.SoftLink)
+    ]

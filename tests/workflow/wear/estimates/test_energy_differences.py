@@ -56,7 +56,7 @@ def test_energies_of_a_file_that_the_half_space_contradicts(tmp_path):
     found = first.energy.sum()
     assert 0.0 < found < 1.0
     (line,) = warnings_of(tmp_path, case, *contact, first)
-    assert f"says that 36 N are dissipated a cycle, the half-space finds {found:.3g}" in line
+    assert f"36 N of dissipated energy per cycle, but the half-space finds {found:.3g}" in line
     assert "check Edx and Edy" in line
     # The half-space's own are believed, and so are those of a mesh that is a little coarse.
     for factor in (1.0, 1.2, 0.8):

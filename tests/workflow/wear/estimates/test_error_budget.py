@@ -80,8 +80,8 @@ def test_parts_add_up_and_unknown_ones_are_named() -> None:
     assert summary_of({"depth": ERROR})["depth"] == {**ERROR.parts, "total": ERROR.total}
     lines = list(sentences({"depth": ERROR}))
     assert lines == [
-        "estimated errors: depth 4.6%",
-        "most of depth: mesh 3.0%, steps 1.2%; unknown: increments",
+        "estimated errors: depth 4.6 %",
+        "largest parts for depth: mesh 3.0 %, steps 1.2 %; unknown: increments",
     ]
     (written,) = arrays_of({"depth": ERROR}).values()
     *by_part, total = written

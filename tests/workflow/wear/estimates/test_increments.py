@@ -157,7 +157,7 @@ def test_nothing_slides_in_the_fewest(blocks):
 def test_check_reports_how_many_there_may_be(blocks):
     for path in (PLANE, blocks):
         output = command("check", path, overrides=[AUTO, "wear.tolerance=4 %"]).stdout
-        assert "as many increments as leave 4 % of depth, about 12 and at most 1000" in output
+        assert "error of 4 %, about 12 and at most 1000" in output
     assert MOST_INCREMENTS == 1000
 
 

@@ -127,8 +127,11 @@ def test_bodies_that_stay_as_they_are_are_condensed_once(strips, tmp_path, monke
         ),
         (["structure.other_bodies.0.name=pad"], "pad twice"),
         (["structure.contacts.0.face_1=shim_above"], "boundary shim_above is on body shim, not on"),
-        (["nonlinearity.check=true"], "known of two bodies"),
-        (["contact.method=nodes", "wear.step.kind=second_order"], "structure.contacts: not where"),
+        (["nonlinearity.check=true"], "only for two bodies"),
+        (
+            ["contact.method=nodes", "wear.step.kind=second_order"],
+            "structure.contacts: not available where",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(strips, overrides, wrong):

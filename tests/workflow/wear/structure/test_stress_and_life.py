@@ -180,8 +180,7 @@ def maps(
     stage = SimpleNamespace(grid=grid, transfer=transfer, transfer_of=lambda _: transfer)
     stressed = StressedBody(stage, METAL, body)  # type: ignore[arg-type]
     alone = StressedCycle(cycle, CycleLoads(cycle.loads, cycle.slip))
-    found = life_maps(life, (stressed, alone, None), known)
-    return {name: quantity.values for name, quantity in found.items()}
+    return dict(life_maps(life, (stressed, alone, None), known))
 
 
 def test_symmetric_load_fares_both_flanks_alike(normal: Any) -> None:

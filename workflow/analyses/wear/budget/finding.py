@@ -36,7 +36,7 @@ def error_budget(
     with reporter.stage("error budget", "probe runs") as progress:
         probed = probe_results(progress)
         for part, failure in probed.failures.items():
-            reporter.log(f"error budget: {part} unknown, a probe run failed: {failure}")
+            reporter.log(f"error budget: {part} unknown, because a probe run failed: {failure}")
         by_part = dict(probed.errors)
         if "coupling" in by_part:
             lag = late(probed.rate, followed(outcome))

@@ -33,6 +33,7 @@ from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint, section_joint
 from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
+from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 
 # Mesh on which two and three dimensions are compared: nodes across a flank, and rows along it per
@@ -73,7 +74,7 @@ def choose_dimension(case: DovetailCase, allowed: float) -> Decision:
     proportional to that energy.
     """
     if case.structure.skew != 0.0:
-        return Decision({DIMENSION: 3}, "a skewed slot is not the same all along")
+        return Decision({DIMENSION: 3}, "the sections of a skewed slot differ")
     try:
         two, three = (_mid_slot(case, dimension) for dimension in (2, 3))
     except (MeshError, MethodFailed) as failure:
@@ -94,9 +95,9 @@ def choose_dimension(case: DovetailCase, allowed: float) -> Decision:
         key=itemgetter(0),
     )
     why = (
-        f"in a coarse probe of mid-slot two dimensions differ from three by at most {largest:.1%} "
-        f"({quantity} on the {flank}); allowed: {allowed:.1%}; "
-        "the ends of the slot, which may wear more, are left out"
+        "in a coarse probe of mid-slot, two dimensions differ from three by at most "
+        f"{percent(largest)} ({quantity} on the {flank}); allowed: {percent(allowed)}; the ends of "
+        "the slot, which may wear more, are not included"
     )
     dimension, error = (3, 0.0) if largest > allowed else (2, largest)
     probe = {"two": two, "three": three, "differences": differences}
@@ -162,11 +163,11 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
         return section_wear(changed(section, {"contact.grid": (cells, cells)}))
 
     most = FINER_SPACE * across if in_space else max(across, MOST_LINE_CELLS)
-    climbs = [climb("strips across the flank", across, most, worn)]
+    climbs = [climb("cells across the flank", across, most, worn)]
     if in_space:
         most = FINER_SPACE * along
         worn_along = partial(slot_wear, section)
-        climbs.append(climb("strips along the slot", along, most, worn_along))
+        climbs.append(climb("cells along the slot", along, most, worn_along))
         along = climbs[1].value
     return Decision(
         {"contact.grid": (climbs[0].value, along)},
@@ -213,8 +214,11 @@ def _climb(
             break
     taken = enough[0] if enough else offered[-1]
     worst = max(by_quantity, key=lambda name: by_quantity[name][taken])
-    why = f"{numbers[taken]} {unit} leave {errors[taken]:.2%} of {allowed:.2%} allowed ({worst})"
-    why += "" if enough else ", the finest that is offered"
+    why = (
+        f"{numbers[taken]} {unit} cause an error of {percent(errors[taken])}, of "
+        f"{percent(allowed)} allowed ({worst})"
+    )
+    why += "" if enough else ", the finest available"
     probe = {"sizes": list(numbers[: len(values)]), "values": values, "errors": errors}
     return Decision(settings(numbers[taken]), why, allowed, errors[taken], probe)
 
@@ -244,7 +248,7 @@ def estimate(
 def choose_tolerance(case: DovetailCase, allowed: float) -> Decision:
     """Choose the share of the error as tolerance of the contact solver, whose error is smaller."""
     tolerance = max(min(allowed, LOOSEST_TOLERANCE), 1e-12)
-    why = "its share: depth and volume were found within half of it"
+    why = "its share of the error: depth and volume were within half of it"
     error = ERROR_PER_TOLERANCE * tolerance
     return Decision({"contact.tolerance": tolerance}, why, allowed, error)
 
@@ -258,14 +262,16 @@ def choose_steps(case: DovetailCase, allowed: float) -> Decision:
         "wear.step.kind": "implicit",
         **{f"wear.step.{size}": None for size in SIZES},
     }
-    return Decision(settings, "its share, for automatic implicit steps", allowed, tolerance)
+    return Decision(
+        settings, "its share of the error, for automatic implicit steps", allowed, tolerance
+    )
 
 
 def choose_drift(case: DovetailCase, allowed: float) -> Decision:
     """Choose the drift at which coupled and uncoupled probe runs would differ by the share."""
     coupling = case.coupling
     if coupling.resultants == "constant":
-        why = "resultants stay those of the unworn structure, as the case has it"
+        why = "resultants stay those of the unworn structure, as the case says"
         return Decision({"coupling.drift": coupling.drift}, why)
     section = plane_section(case)
     apart = section_wear(section)
@@ -278,8 +284,8 @@ def choose_drift(case: DovetailCase, allowed: float) -> Decision:
     settings = {"coupling.drift": bounded, "coupling.resultants": "drift"}
     error = effect if drift <= 0.0 else min(effect, effect * bounded / drift)
     why = (
-        f"drift of {drift:.2%} over the run changes depth or volume by {effect:.2%}; "
-        f"allowed: {allowed:.2%}"
+        f"drift of {percent(drift)} over the run changes depth or volume by {percent(effect)}; "
+        f"allowed: {percent(allowed)}"
     )
     probe = {"apart": apart, "coupled": coupled, "drift": drift, "effect": effect}
     return Decision(settings, why, allowed, error, probe)

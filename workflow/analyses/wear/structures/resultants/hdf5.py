@@ -103,7 +103,7 @@ def read_h5(
         if not interfaces:
             raise InputFileError(
                 f"{file}: /{group}: no interfaces; allowed: a group for each, with a group "
-                f"{LOADS} in it; at the top: {', '.join(opened) or 'nothing'}"
+                f"{LOADS} in it; at the top: {', '.join(own(opened)) or 'nothing'}"
             )
         read = {name: _read(FileGroup(file, item), bounds(name), line) for name, item in interfaces}
     _check_counts(file, read)
