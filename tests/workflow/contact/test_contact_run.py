@@ -145,7 +145,6 @@ def test_unlike_bodies_pressed_in_one_increment_are_followed_or_warned_of(tmp_pa
     assert radii[1] < 0.7 * radii[0]
     (warning,) = given["warnings"]
     assert "contact.history: auto" in warning
-    assert "contact.history: auto" in warning
     assert "load_path.legs.0.increments" in warning
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from tests.workflow.vibration.test_vibration_case import ONE_MASS, RIG, SAMPLED, STIFFNESS
 from tests.workflow.vibration.time_scenes import receptance, refused, run
+from workflow.shell.output.results import own
 
 FORCE, AT = 2.0, (75.0, 120.0)
 
@@ -42,7 +43,7 @@ def test_harmonics_are_those_of_the_closed_form(stuck):
             name: file["names"][name][()].astype(str).tolist() for name in ("places", "joints")
         }
         groups = {
-            group: {name: values[()] for name, values in datasets.items()}
+            group: {name: datasets[name][()] for name in own(datasets)}
             for group, datasets in file["responses/00000/harmonics"].items()
         }
         assert "Re(c_k" in file["responses/00000/harmonics/curve/joint_force"].attrs["description"]
