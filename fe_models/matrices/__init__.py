@@ -1,7 +1,7 @@
 r"""Matrices of structures from other programs, and reduced models for other programs.
 
 - ``external_matrices``, ``ExternalMatrices``: stiffness, mass, damping and loads from files, in
-base units
+  base units
 - ``Unknown``, ``GivenUnknowns``, ``FileUnits``: meaning and units of their rows
 - ``read_matrix_file``, ``MatrixFile``: content of a single file
 - ``on_retained``, ``on_all``: reduced model of the matrices, on some points or on all
