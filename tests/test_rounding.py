@@ -22,7 +22,8 @@ PERTURBED = ("-p", "tests.perturbed")
 
 
 def modules(package, *names):
-    return [f"tests/{package}/test_{name}.py" for name in names]
+    """Return the test modules of these names, in whichever folder of the package they are."""
+    return [str(next((ROOT / "tests" / package).rglob(f"test_{name}.py"))) for name in names]
 
 
 # Tests in which comparisons of rounded numbers decide: what touches, sticks or has converged, which
