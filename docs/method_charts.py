@@ -43,7 +43,7 @@ from workflow.analyses.specimens.model import SpecimensModel
 from workflow.analyses.wear.approximations.approximation import Approximation, Rung
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import structure_loads
-from workflow.chart.costs import Cost
+from workflow.chart.costs import RunCost
 from workflow.chart.figures import axis_figure
 from workflow.chart.frontier import efficient
 from workflow.chart.ladder import Ladder, Point, judge
@@ -206,7 +206,7 @@ def _judged(
 ) -> Point:
     """Return a rung whose error is known."""
     result, seconds = _timed(work)
-    wrong, cost = error(result), Cost(seconds, 0, 0)
+    wrong, cost = error(result), RunCost(seconds, 0, 0)
     return Point(rung, own, "", {}, cost, error=wrong, bound=wrong, seconds=seconds)
 
 
@@ -232,7 +232,7 @@ def _meshes(
             values, seconds = _timed(partial(measured, _on_mesh(name, order, count / default)))
             rung = Rung(f"order {order}, {count} {what}", {}, 1.0 / count, f"order {order}")
             own = (order, count) == (DEFAULT_ORDER, default)
-            points.append(Point(rung, own, "", values, Cost(seconds, 0, 0)))
+            points.append(Point(rung, own, "", values, RunCost(seconds, 0, 0)))
     return points
 
 

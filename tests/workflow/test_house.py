@@ -50,6 +50,16 @@ def test_no_circle_of_imports(package: str) -> None:
     TopologicalSorter(graph).prepare()
 
 
+def test_no_public_class_has_the_name_of_another() -> None:
+    places: dict[str, list[str]] = {}
+    for package in PACKAGES:
+        for module, tree in modules(package).items():
+            for node in ast.walk(tree):
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    places.setdefault(node.name, []).append(module)
+    assert not {name: where for name, where in places.items() if len(where) > 1}
+
+
 def owner(module: str) -> str:
     """Return the folder that a module belongs to: an analysis, or another part of workflow."""
     parts = module.split(".")

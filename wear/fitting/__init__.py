@@ -3,7 +3,7 @@
 Fits
     - ``fit``: solve a problem by least squares.
     - ``FitProblem``: free parameters, measured data, and the model between them.
-    - ``Unknown``: a free parameter and its bounds.
+    - ``FreeParameter``: a free parameter and its bounds.
     - ``Series``: data of one kind.
     - ``Fit``: the best values, with residuals, correlation and confidence bands.
     - ``Estimate``: value, deviation and bounds of one parameter, or why it is not determined.
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from wear.fitting.evolutions import EvolutionData, evolution_problem
     from wear.fitting.least_squares import Fit, fit
     from wear.fitting.loops import LoopData, loop_data, loop_problem
-    from wear.fitting.problem import FitError, FitProblem, Series, Unknown
+    from wear.fitting.problem import FitError, FitProblem, FreeParameter, Series
     from wear.fitting.scars import ComputedScars, ScarData, scar_problem
     from wear.fitting.volumes import VolumeData, VolumeLaw, volume_problem
 
@@ -58,10 +58,10 @@ __all__ = [
     "Fit",
     "FitError",
     "FitProblem",
+    "FreeParameter",
     "LoopData",
     "ScarData",
     "Series",
-    "Unknown",
     "VolumeData",
     "VolumeLaw",
     "common_over",
@@ -83,7 +83,7 @@ __getattr__, __dir__ = lazy_names(
         "evolutions": ("EvolutionData", "evolution_problem"),
         "least_squares": ("Fit", "fit"),
         "loops": ("LoopData", "loop_data", "loop_problem"),
-        "problem": ("FitError", "FitProblem", "Series", "Unknown"),
+        "problem": ("FitError", "FitProblem", "Series", "FreeParameter"),
         "scars": ("ComputedScars", "ScarData", "scar_problem"),
         "volumes": ("VolumeData", "VolumeLaw", "volume_problem"),
     },

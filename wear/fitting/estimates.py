@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sa_solver.types import Array, Mask
-from wear.fitting.problem import FitProblem, Unknown
+from wear.fitting.problem import FitProblem, FreeParameter
 
 RANK = 1e-6
 """Share of the largest singular value of the Jacobian below which a singular value counts as 0. The
@@ -67,9 +67,9 @@ class Estimate:
     A force from friction and load, of which only the product matters:
 
     >>> import numpy as np
-    >>> from wear.fitting import FitProblem, Series, Unknown, fit
+    >>> from wear.fitting import FitProblem, Series, FreeParameter, fit
     >>> force = FitProblem(
-    ...     unknowns=(Unknown("friction", lower=0.0), Unknown("load", lower=0.0)),
+    ...     unknowns=(FreeParameter("friction", lower=0.0), FreeParameter("load", lower=0.0)),
     ...     series=(Series("force", np.array([30.1, 29.8, 30.0])),),
     ...     predict=lambda values: np.full(3, values[0] * values[1]),
     ...     starts=[np.array([0.5, 50.0])],
@@ -173,7 +173,7 @@ def estimate_at(
     )
 
 
-def why_too_wide(unknown: Unknown, value: float, bounds: tuple[float, float]) -> str:
+def why_too_wide(unknown: FreeParameter, value: float, bounds: tuple[float, float]) -> str:
     """Return why bounds are too wide for a determined parameter, or an empty text."""
     lower, upper = bounds
     if unknown.logarithmic:

@@ -19,8 +19,8 @@ from sa_solver.types import Array
 from wear.fitting.problem import (
     FitError,
     FitProblem,
+    FreeParameter,
     Series,
-    Unknown,
     require_distinct_names,
     settle_columns,
 )
@@ -319,7 +319,7 @@ def _named(
 
 def _unknowns(
     data: Sequence[EvolutionData], shared: Sequence[str]
-) -> tuple[dict[tuple[str, str], int], tuple[Unknown, ...]]:
+) -> tuple[dict[tuple[str, str], int], tuple[FreeParameter, ...]]:
     """Return the index of each free parameter among the unknowns, and the unknowns."""
     for name in shared:
         if not any(name in one.free for one in data):
@@ -327,7 +327,7 @@ def _unknowns(
     largest = max(one.energy.max() for one in data)
     smallest = min(one.energy[one.energy > 0.0].min() for one in data)
     names: dict[tuple[str, str], int] = {}
-    unknowns: dict[str, Unknown] = {}
+    unknowns: dict[str, FreeParameter] = {}
     for one in data:
         for name in one.free:
             full_name = name if name in shared else f"{one.name}.{name}"
@@ -338,14 +338,16 @@ def _unknowns(
 
 def _unknown(
     data: EvolutionData, name: str, full_name: str, energies: tuple[float, float]
-) -> Unknown:
+) -> FreeParameter:
     if name == INITIAL:
-        return Unknown(full_name, lower=0.0)
+        return FreeParameter(full_name, lower=0.0)
     if name in data.shape.rates:
         lowest, highest = _rate_range(data, name, energies)
-        return Unknown(full_name, lowest / REACH, highest * REACH, logarithmic=True)
+        return FreeParameter(full_name, lowest / REACH, highest * REACH, logarithmic=True)
     lower, upper = data.shape.bounds[name]
-    return Unknown(full_name, lower, upper, size=1.0 / energies[1] if name == "slope" else 1.0)
+    return FreeParameter(
+        full_name, lower, upper, size=1.0 / energies[1] if name == "slope" else 1.0
+    )
 
 
 def _rate_range(

@@ -218,10 +218,10 @@ def fit(problem: FitProblem) -> Fit:
     A slope and an intercept from four points, with the usual bounds:
 
     >>> import numpy as np
-    >>> from wear.fitting import FitProblem, Series, Unknown, fit
+    >>> from wear.fitting import FitProblem, Series, FreeParameter, fit
     >>> x, y = np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.1, 2.9, 5.2, 6.8])
     >>> line = FitProblem(
-    ...     unknowns=(Unknown("intercept"), Unknown("slope")),
+    ...     unknowns=(FreeParameter("intercept"), FreeParameter("slope")),
     ...     series=(Series("y", y),),
     ...     predict=lambda values: values[0] + values[1] * x,
     ...     starts=[np.array([0.0, 1.0])],

@@ -21,7 +21,7 @@ import numpy as np
 
 from sa_solver import checks
 from sa_solver.types import Array, Indices
-from wear.fitting.problem import FitError, FitProblem, Series, Unknown
+from wear.fitting.problem import FitError, FitProblem, FreeParameter, Series
 from wear.joints.bouc_wen_curve import TabulatedBoucWen
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
@@ -360,18 +360,20 @@ def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) 
     return replace(made, problem=problem)
 
 
-def _offsets(data: Sequence[LoopData]) -> list[Unknown]:
+def _offsets(data: Sequence[LoopData]) -> list[FreeParameter]:
     """Return the mean forces of the data, as nuisances if a record has several steps."""
     size = max(float(np.abs(one.force).max()) for one in data)
     names = [one.name for one in data]
     several = len(set(names)) < len(names)
     return [
-        Unknown(f"{name}.{OFFSET}" + (f"_{number}" if several else ""), size=size, nuisance=several)
+        FreeParameter(
+            f"{name}.{OFFSET}" + (f"_{number}" if several else ""), size=size, nuisance=several
+        )
         for number, name in enumerate(names, 1)
     ]
 
 
-def _turns(data: LoopData, number: int) -> list[Unknown]:
+def _turns(data: LoopData, number: int) -> list[FreeParameter]:
     """Return the turning points of all loops of the data with a ``number``.
 
     The lower and the upper point of each loop alternate.
@@ -383,7 +385,7 @@ def _turns(data: LoopData, number: int) -> list[Unknown]:
         for at, sense in zip(pair, (-1.0, 1.0), strict=True):
             low, high = sorted((at - sense * within, at + sense * beyond))
             name = f"{data.name}.turn_{number}_{loop}_{'lower' if sense < 0.0 else 'upper'}"
-            unknowns.append(Unknown(name, low, high, data.amplitude, nuisance=True))
+            unknowns.append(FreeParameter(name, low, high, data.amplitude, nuisance=True))
     return unknowns
 
 
@@ -401,14 +403,14 @@ def _series(name: str, data: Sequence[LoopData], slopes: Sequence[Array]) -> Ser
     return Series(name, forces, shares=np.maximum(shares / shares.max(), LEAST_SHARE))
 
 
-def _unknown(name: str, law: LoopLaw, stiffness: float) -> Unknown:
+def _unknown(name: str, law: LoopLaw, stiffness: float) -> FreeParameter:
     if name in law.shape:
         lower, upper = law.shape[name]
-        return Unknown(name, lower, upper, size=1.0)
+        return FreeParameter(name, lower, upper, size=1.0)
     if name == "residual_stiffness":
         # A residual stiffness of 0, to within a small part of the stiffness, is also determined.
-        return Unknown(name, 0.0, size=stiffness)
-    return Unknown(name, 0.0)
+        return FreeParameter(name, 0.0, size=stiffness)
+    return FreeParameter(name, 0.0)
 
 
 def _forces(made: LoopFit, chosen: Iterable[int], values: Array) -> Array:

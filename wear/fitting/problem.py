@@ -51,7 +51,7 @@ def require_distinct_names(names: Sequence[str]) -> None:
 
 
 @dataclass(frozen=True)
-class Unknown:
+class FreeParameter:
     """Free parameter of a fit.
 
     Parameters
@@ -72,8 +72,8 @@ class Unknown:
     --------
     A rate that is known within powers of ten:
 
-    >>> from wear.fitting import Unknown
-    >>> rate = Unknown("rate", lower=1e-9, upper=1e-3, logarithmic=True)
+    >>> from wear.fitting import FreeParameter
+    >>> rate = FreeParameter("rate", lower=1e-9, upper=1e-3, logarithmic=True)
     """
 
     name: str
@@ -155,9 +155,9 @@ class FitProblem:
     The mean of three values as a problem:
 
     >>> import numpy as np
-    >>> from wear.fitting import FitProblem, Series, Unknown, fit
+    >>> from wear.fitting import FitProblem, Series, FreeParameter, fit
     >>> mean = FitProblem(
-    ...     unknowns=(Unknown("mean"),),
+    ...     unknowns=(FreeParameter("mean"),),
     ...     series=(Series("y", np.array([1.0, 2.0, 3.0])),),
     ...     predict=lambda values: np.full(3, values[0]),
     ...     starts=[np.zeros(1)],
@@ -166,7 +166,7 @@ class FitProblem:
     2.000000
     """
 
-    unknowns: tuple[Unknown, ...]
+    unknowns: tuple[FreeParameter, ...]
     series: tuple[Series, ...]
     predict: Callable[[Array], Array]
     starts: Sequence[Array]

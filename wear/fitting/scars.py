@@ -32,7 +32,7 @@ from sa_solver import checks
 from sa_solver.types import Array
 from wear.fitting.estimates import inverse_of
 from wear.fitting.least_squares import Fit
-from wear.fitting.problem import FitError, FitProblem, Series, Unknown, column, settle_columns
+from wear.fitting.problem import FitError, FitProblem, FreeParameter, Series, column, settle_columns
 
 COEFFICIENT, THRESHOLD = "coefficient", "threshold"
 SHIFT, HEIGHT, TILT = "shift", "height", "tilt"
@@ -324,10 +324,10 @@ def scar_problem(data: Sequence[ScarData], threshold: bool = False) -> ScarFit:
     # The difference step of the solver is 6e-6 for all values below 1. For a coefficient of 1e-9
     # /MPa this is far too long where the depth is not proportional to it; for its logarithm it is
     # right.
-    unknowns = [Unknown(f"{b}.{COEFFICIENT}", lower, upper, logarithmic=True) for b in bodies]
+    unknowns = [FreeParameter(f"{b}.{COEFFICIENT}", lower, upper, logarithmic=True) for b in bodies]
     if threshold:
         largest = _largest_threshold(data)
-        unknowns.append(Unknown(THRESHOLD, 0.0, largest, size=largest))
+        unknowns.append(FreeParameter(THRESHOLD, 0.0, largest, size=largest))
     for one in data:
         unknowns += _alignment(one)
     series = tuple(Series(one.name, one.depth, one.deviations) for one in data)
@@ -349,15 +349,15 @@ def _largest_threshold(data: Sequence[ScarData]) -> float:
     return LATEST * min(one.energy or 0.0 for one in data)
 
 
-def _alignment(data: ScarData) -> list[Unknown]:
+def _alignment(data: ScarData) -> list[FreeParameter]:
     """Return the shift, height and tilt of one profile as unknowns."""
     if data.aligned:
         return []
     length, most = float(np.ptp(data.x)), float(np.ptp(data.depth))
     return [
-        Unknown(f"{data.name}.{SHIFT}", -length, length, size=length),
-        Unknown(f"{data.name}.{HEIGHT}", size=most),
-        Unknown(f"{data.name}.{TILT}", size=most / length),
+        FreeParameter(f"{data.name}.{SHIFT}", -length, length, size=length),
+        FreeParameter(f"{data.name}.{HEIGHT}", size=most),
+        FreeParameter(f"{data.name}.{TILT}", size=most / length),
     ]
 
 

@@ -20,8 +20,8 @@ from sa_solver.types import Array
 from wear.fitting.problem import (
     FitError,
     FitProblem,
+    FreeParameter,
     Series,
-    Unknown,
     require_distinct_names,
     settle_columns,
 )
@@ -191,7 +191,7 @@ def volume_problem(data: Sequence[VolumeData], law: VolumeLaw) -> VolumeFit:
         _check(one, law)
     require_distinct_names([one.name for one in data])
     names: dict[tuple[str, str], int] = {}
-    unknowns: list[Unknown] = []
+    unknowns: list[FreeParameter] = []
     for one in data:
         for name, unknown in _unknowns(one, law):
             if name != EXPONENT or (data[0].name, EXPONENT) not in names:
@@ -237,17 +237,17 @@ def _check(data: VolumeData, law: VolumeLaw) -> None:
         )
 
 
-def _unknowns(data: VolumeData, law: VolumeLaw) -> list[tuple[str, Unknown]]:
+def _unknowns(data: VolumeData, law: VolumeLaw) -> list[tuple[str, FreeParameter]]:
     """Return the free parameters of one body with their names."""
     largest, most = float(data.energy.max()), float(np.abs(data.volume).max())
-    unknowns = [(COEFFICIENT, Unknown(f"{data.name}.{COEFFICIENT}", lower=0.0))]
+    unknowns = [(COEFFICIENT, FreeParameter(f"{data.name}.{COEFFICIENT}", lower=0.0))]
     if law.offset == THRESHOLD:
-        free = Unknown(f"{data.name}.{THRESHOLD}", 0.0, largest, size=largest)
+        free = FreeParameter(f"{data.name}.{THRESHOLD}", 0.0, largest, size=largest)
         unknowns.append((THRESHOLD, free))
     if law.offset == INTERCEPT:
-        unknowns.append((INTERCEPT, Unknown(f"{data.name}.{INTERCEPT}", size=most)))
+        unknowns.append((INTERCEPT, FreeParameter(f"{data.name}.{INTERCEPT}", size=most)))
     if law.exponent is None:
-        free = Unknown(EXPONENT, -LARGEST_EXPONENT, LARGEST_EXPONENT, size=1.0)
+        free = FreeParameter(EXPONENT, -LARGEST_EXPONENT, LARGEST_EXPONENT, size=1.0)
         unknowns.append((EXPONENT, free))
     return unknowns
 

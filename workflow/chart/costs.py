@@ -37,7 +37,7 @@ STAGE = re.compile(r"\d\d:\d\d:\d\d (?P<name>[a-z][a-z ,-]*): (?P<seconds>\d+\.\
 
 
 @dataclass(frozen=True)
-class Cost:
+class RunCost:
     """Cost of a run: waiting time in seconds, number of convolutions, and of contact solves."""
 
     seconds: float
@@ -59,7 +59,7 @@ def stage_seconds(log: str) -> dict[str, list[float]]:
 
 def costs(
     cases: Sequence[Case], folders: Sequence[Path], summaries: Sequence[Mapping[str, Any]]
-) -> list[Cost]:
+) -> list[RunCost]:
     """Return the cost of each run, as if nothing came from the cache.
 
     A cached stage costs as much as the longest such stage among all runs of the same structure.
@@ -77,7 +77,7 @@ def costs(
         seconds = {name: sum(durations) for name, durations in logged.items() if name != PICTURES}
         for stage, (key, warm) in of_run.items():
             seconds[stage] += cold[stage, key] - warm
-        paid.append(Cost(sum(seconds.values()), *_work(summary)))
+        paid.append(RunCost(sum(seconds.values()), *_work(summary)))
     return paid
 
 

@@ -8,7 +8,7 @@ from math import inf, nan
 
 from workflow.analyses.wear.approximations.approximation import Approximation, Rung
 from workflow.analyses.wear.approximations.convergence import Convergence, richardson
-from workflow.chart.costs import Cost
+from workflow.chart.costs import RunCost
 from workflow.chart.frontier import Option, efficient
 
 # Relative changes of a quantity below this are rounding, and say nothing about convergence.
@@ -34,7 +34,7 @@ class Point:
     baseline: bool
     folder: str
     values: Mapping[str, float]
-    cost: Cost
+    cost: RunCost
     extras: Mapping[str, float] = field(default_factory=dict)
     error: float = inf
     worst: str = ""

@@ -28,7 +28,7 @@ from workflow.case.changing import changed
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case
 from workflow.chart.axes import Setting, axes_of
-from workflow.chart.costs import Cost, costs
+from workflow.chart.costs import RunCost, costs
 from workflow.chart.ladder import Ladder, Point, judge
 from workflow.errors import MethodFailed, UserError
 from workflow.kinds import analysis_of, load_case
@@ -73,7 +73,7 @@ class _Run:
 
     folder: Path
     summary: Mapping[str, Any]
-    cost: Cost
+    cost: RunCost
 
 
 def accuracy_of(text: str) -> float:

@@ -68,7 +68,7 @@ class Check:
     ``title`` is the title of the case and ``outline`` has rows of name and text on what would run.
     ``memory`` is an upper estimate of the memory [bytes]. ``seconds`` is the order of magnitude of
     the run time [s]; ``time`` is the same as text, with what cannot be known before the run.
-    ``plausibility_warnings`` are plausibility warnings.
+    ``plausibility_warnings`` name values that are probably mistakes.
 
     Examples
     --------

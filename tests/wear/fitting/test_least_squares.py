@@ -7,8 +7,8 @@ from scipy.stats import binom, linregress, norm, t
 from wear.fitting import (
     FitError,
     FitProblem,
+    FreeParameter,
     Series,
-    Unknown,
     VolumeData,
     VolumeLaw,
     fit,
@@ -22,7 +22,7 @@ NOISE = np.array([0.3, -0.5, 0.1, 0.4, -0.2, -0.1])
 def line(values, deviations=None, x=X):
     """Return the fit of a line through ``values`` at ``x`` as a problem."""
     return FitProblem(
-        (Unknown("start", size=10.0), Unknown("slope", size=10.0)),
+        (FreeParameter("start", size=10.0), FreeParameter("slope", size=10.0)),
         (Series("y", values, deviations),),
         lambda p: p[0] + p[1] * x,
         [np.array([0.0, 1.0])],
@@ -65,7 +65,7 @@ def test_series_with_a_common_parameter_find_their_own_scatter():
     x = np.linspace(0.0, 1.0, 20)
     exact, rough = (2.0 * x + s * rng.standard_normal(20) for s in (0.001, 0.1))
     both = FitProblem(
-        (Unknown("slope"),),
+        (FreeParameter("slope"),),
         (Series("rough", rough), Series("exact", exact)),
         lambda p: np.tile(p[0] * x, 2),
         [np.ones(1)],
@@ -84,7 +84,7 @@ def test_series_with_a_common_parameter_find_their_own_scatter():
 
 def test_products_quotients_and_what_does_not_count_are_named():
     y = 2.0 * X + NOISE
-    unknowns = tuple(Unknown(name, lower=0.0) for name in ("a", "b", "c", "d"))
+    unknowns = tuple(FreeParameter(name, lower=0.0) for name in ("a", "b", "c", "d"))
     problem = FitProblem(
         unknowns,
         (Series("y", y),),
@@ -104,7 +104,7 @@ def test_products_quotients_and_what_does_not_count_are_named():
 def test_a_parameter_at_its_bound_is_reported():
     y = 1.0 - 0.5 * X
     held = FitProblem(
-        (Unknown("start", size=1.0), Unknown("slope", lower=0.0)),
+        (FreeParameter("start", size=1.0), FreeParameter("slope", lower=0.0)),
         (Series("y", y + NOISE),),
         lambda p: p[0] + p[1] * X,
         [np.array([0.0, 1.0])],

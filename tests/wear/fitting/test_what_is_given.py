@@ -9,9 +9,9 @@ from wear.fitting import (
     ComputedScars,
     EvolutionData,
     FitProblem,
+    FreeParameter,
     ScarData,
     Series,
-    Unknown,
     VolumeData,
     VolumeLaw,
     common_over,
@@ -61,7 +61,7 @@ def scars(x=PLACES, depth=DEPTH, runs=RUNS, **more):
 def mean(values=DATA, start=(0.5,), unknown=None, **more):
     series = Series("y", values, **more)
     predict = lambda free: np.full(len(DATA), free[0])  # noqa: E731
-    return fitted(FitProblem((unknown or Unknown("mean"),), (series,), predict, [start]))
+    return fitted(FitProblem((unknown or FreeParameter("mean"),), (series,), predict, [start]))
 
 
 # Of each entry a good field, and the numbers that it makes of it.
@@ -132,9 +132,9 @@ def test_what_is_no_column_of_numbers_is_refused(entry, kind):
 @pytest.mark.parametrize("value", NO_NUMBERS)
 def test_what_is_no_number_is_refused(value):
     attempts = (
-        lambda: Unknown("k", lower=value),
-        lambda: Unknown("k", upper=value),
-        lambda: Unknown("k", size=value),
+        lambda: FreeParameter("k", lower=value),
+        lambda: FreeParameter("k", upper=value),
+        lambda: FreeParameter("k", size=value),
         lambda: VolumeLaw(exponent=value),
         lambda: VolumeLaw(reference=value),
         lambda: friction(held={"initial": value}),
@@ -150,8 +150,8 @@ def test_what_is_no_number_is_refused(value):
 @pytest.mark.parametrize(
     "attempt",
     [
-        lambda: Unknown("k", lower=2.0, upper=1.0),
-        lambda: Unknown("rate", lower=-1.0, logarithmic=True),
+        lambda: FreeParameter("k", lower=2.0, upper=1.0),
+        lambda: FreeParameter("rate", lower=-1.0, logarithmic=True),
         lambda: VolumeLaw(offset="treshold"),
         lambda: VolumeLaw(reference=0.0),
         lambda: volume_problem([], VolumeLaw()),
@@ -169,7 +169,9 @@ def test_what_is_no_number_is_refused(value):
         lambda: loop_data("r", MEASURED, most=0),
         lambda: mean(start=(0.5, 0.5)),
         lambda: fit(
-            FitProblem((Unknown("mean"),), (Series("y", DATA),), lambda free: free, [np.zeros(1)])
+            FitProblem(
+                (FreeParameter("mean"),), (Series("y", DATA),), lambda free: free, [np.zeros(1)]
+            )
         ),
         lambda: common_over(FOUND, np.zeros(5, dtype=int)),
         lambda: common_over(FOUND, 0.5 + np.zeros(6)),

@@ -16,7 +16,7 @@ from workflow.analyses.wear.output.measures import profile_difference
 from workflow.case.text.writing import dump_case
 from workflow.chart import Chart, accuracy_of
 from workflow.chart.axes import AXES, axes_of
-from workflow.chart.costs import Cost, costs, stage_seconds
+from workflow.chart.costs import RunCost, costs, stage_seconds
 from workflow.chart.frontier import Option, cheapest, efficient
 from workflow.chart.ladder import Ladder, Point, judge
 from workflow.chart.report import sentences, write_chart
@@ -117,7 +117,7 @@ GRID, METHOD = (next(axis for axis in AXES if axis.name == name) for name in ("g
 
 def point(name: str, step: float | None, values: dict[str, float], seconds: float) -> Point:
     """Return a rung that took ten convolutions per second; ``own`` is the case as written."""
-    cost = Cost(seconds, round(10 * seconds), 1)
+    cost = RunCost(seconds, round(10 * seconds), 1)
     return Point(Rung(name, {"a": name}, step), name == "own", name, values, cost)
 
 
@@ -138,7 +138,7 @@ def test_a_busy_machine_changes_no_choice():
     assert [rung.seconds for rung in ladder.rungs] == [2.0, 4.0, 4.0, 6.0]
     # Two ways to the same error, apart by less than the clock has shown to be wrong.
     ways = [point(name, None, {"depth": 1.0}, spent) for name, spent in (("a", 3.0), ("b", 3.5))]
-    ways[0] = replace(ways[0], cost=Cost(3.0, 100, 1))
+    ways[0] = replace(ways[0], cost=RunCost(3.0, 100, 1))
     both = judge(GRID, [*points, *ways], {"depth": 1.0}, {})
     chosen = both.cheapest(1e-4)
     assert chosen is not None
@@ -271,7 +271,7 @@ def test_what_is_found_in_the_cache_costs_what_it_took_to_compute(tmp_path: Path
     work = {"work": {"convolutions": 20, "contact_solves": 3}}
     first, second, third = costs(cases, folders, [work] * 3)
     whole = 0.5 + 8.0 + 3.0 + 1.0 + 2.5 + 1.25
-    assert first == Cost(pytest.approx(whole), 20, 3)
+    assert first == RunCost(pytest.approx(whole), 20, 3)
     assert second.seconds == pytest.approx(whole)
     assert third.seconds == pytest.approx(whole + 3.0)
 

@@ -12,7 +12,7 @@ from workflow.analyses.specimens.wear import BlockState
 
 
 @dataclass(frozen=True)
-class StoredState:
+class SpecimensState:
     """A worn state with its ``curve`` of first loading."""
 
     block: BlockState
@@ -46,7 +46,7 @@ class LoadOutcome:
 
     force: float
     blocks: tuple[BlockState, ...]
-    kept: tuple[StoredState, ...]
+    kept: tuple[SpecimensState, ...]
     half_space: tuple[HalfSpaceState, HalfSpaceState]
     marched: MarchedCycle
 

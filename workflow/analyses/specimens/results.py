@@ -15,7 +15,7 @@ from fe_models.matrices import write_matrices
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.layout import LAYOUT, PAD
-from workflow.analyses.specimens.outcome import LoadOutcome, SpecimensOutcome, StoredState
+from workflow.analyses.specimens.outcome import LoadOutcome, SpecimensOutcome, SpecimensState
 from workflow.analyses.specimens.summary import (
     SLOPE_SHARE,
     collapse,
@@ -124,7 +124,7 @@ def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Array]:
     }
 
 
-def _state(kept: StoredState, areas: Array) -> dict[str, Array]:
+def _state(kept: SpecimensState, areas: Array) -> dict[str, Array]:
     """Return fields of the pad in a worn state, at its nodes."""
     block, contact = kept.block, kept.block.contact
     worn_1, worn_2 = block.depths

@@ -30,7 +30,7 @@ from workflow.analyses.specimens.outcome import (
     LoadOutcome,
     MarchedCycle,
     SpecimensOutcome,
-    StoredState,
+    SpecimensState,
 )
 from workflow.analyses.specimens.results import write_specimens_output
 from workflow.analyses.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
@@ -135,7 +135,7 @@ def _fret(
             steps("first loading", partial(first_loading, pair, state, conditions))
             for state in _chosen(blocks)
         )
-        kept = tuple(map(StoredState, _chosen(blocks), curves))
+        kept = tuple(map(SpecimensState, _chosen(blocks), curves))
     grid = half_space.grid
     height = model.gap(grid)
     path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)

@@ -10,7 +10,7 @@ from fe_models.joints.reduced_contact import ReducedPair
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import Reported
 from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState
-from workflow.analyses.specimens.outcome import LoadOutcome, SpecimensOutcome, StoredState
+from workflow.analyses.specimens.outcome import LoadOutcome, SpecimensOutcome, SpecimensState
 from workflow.analyses.specimens.wear import BlockState
 
 # A quantity is steady while it stays within this value of its last one: relative to the stiffness,
@@ -122,7 +122,7 @@ def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> 
 
 
 def _beside(
-    outcome: SpecimensOutcome, state: StoredState, beside: HalfSpaceState
+    outcome: SpecimensOutcome, state: SpecimensState, beside: HalfSpaceState
 ) -> dict[str, float]:
     """Return numbers of the half-space, the misfit of its link, and differences of its fields."""
     areas, contact = outcome.model.pair.areas, state.block.contact
