@@ -363,10 +363,7 @@ def test_the_first_worker_may_come_late(contact, tmp_path, impatient, caplog):
     (reported,) = (
         record.getMessage() for record in caplog.records if record.name[:8] == "workflow"
     )
-    assert reported == (
-        f"--dask {address}: no worker yet, 1 of 1 runs wait for one; Ctrl-C ends it, what is done "
-        "is kept"
-    )
+    assert reported.startswith(f"--dask {address}: no worker yet, 1 of 1 runs wait for one")
 
 
 @pytest.mark.slow
