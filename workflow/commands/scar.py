@@ -175,10 +175,10 @@ def _table(scar: Scar) -> list[str]:
         "patches [1]": (scar.patches, None),
         "missing [1]": (scar.missing, None),
     }
-    reported = [
+    lines = [
         f"{name},{_cell(value, 10)},{_cell(bound, 6)}" for name, (value, bound) in rows.items()
     ]
-    return ["quantity,value,bound 95 %", *reported]
+    return ["quantity,value,bound 95 %", *lines]
 
 
 def _cell(value: float | None, digits: int) -> str:

@@ -122,7 +122,7 @@ def _draw_points(
 ) -> None:
     points = found.points if whole else found.points.only(found.inside)
     bars = None if points.deviations is None else points.deviations / y_unit
-    reported = "measured" if bars is None else "measured, one standard deviation"
+    label = "measured" if bars is None else "measured, one standard deviation"
     axis.errorbar(
         points.x / x_unit,
         points.y / y_unit,
@@ -134,7 +134,7 @@ def _draw_points(
         lw=1.2,
         capsize=3.0,
         zorder=5,
-        label=reported,
+        label=label,
     )
 
 

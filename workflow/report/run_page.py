@@ -77,11 +77,11 @@ def _header(run: ReportData, parts: Sequence[Html]) -> Html:
     what = (type(run.case).__doc__ or "").partition("\n")[0]
     lead = f"{what} Computed by fretscale {version}"
     warnings = len(run.summary["warnings"])
-    reported = f"{warnings} warning{'s' * (warnings != 1)}" if warnings else "no warnings"
+    counted = f"{warnings} warning{'s' * (warnings != 1)}" if warnings else "no warnings"
     return element(
         "header",
         element("h1", run.case.title),
-        element("p", f"{lead}; {reported}{_met(run)}.", cls="lead"),
+        element("p", f"{lead}; {counted}{_met(run)}.", cls="lead"),
         contents_of(parts),
     )
 
@@ -110,11 +110,11 @@ def _warnings(warnings: Sequence[str]) -> Html:
         if not colon or (" " in place and alike[rest] == 1):
             place, rest = "", warning
         places.setdefault(typeset(rest), []).append(typeset(place))
-    reported = (
+    texts = (
         element("span", element("strong", "; ".join(those)), ": ", rest) if any(those) else rest
         for rest, those in places.items()
     )
-    return items(reported) if places else Html("")
+    return items(texts) if places else Html("")
 
 
 def _verdicts(run: ReportData) -> list[Verdict | str]:
@@ -145,10 +145,10 @@ def _expectations(run: ReportData) -> Html:
         rows.append([name, *_verdict_cells(verdict, quantity), source])
     head = ["", "expected", "computed", "off by", "allowed", "", "expected from"]
     signs = any(entry.quantity.startswith(SIGNS) for entry in run.case.expect)
-    reported = (
+    explained = (
         note("For a change or trend, 1 is a rise, −1 a fall, and 0 neither.") if signs else ""
     )
-    return lines([table(head, rows, numbers=(1, 2, 3, 4), stacks=True), html(reported)])
+    return lines([table(head, rows, numbers=(1, 2, 3, 4), stacks=True), html(explained)])
 
 
 def _verdict_cells(verdict: Verdict | str, quantity: SummaryQuantity | None) -> list[object]:
@@ -182,16 +182,18 @@ def _measured(summary: Mapping[str, Any]) -> Html:
     if not rows:
         return Html("")
     head = ["", "points", "mean", "rms", "rms, relative", "chi² per point", "most at", "from"]
-    reported = (
+    explained = (
         "Computed minus measured, with straight lines between computed points. Relative is over "
         "the rms of what was measured. A chi² of 1 is the scatter that the deviations give."
     )
     if any(one["nearest_of_several_branches"] for one in found if "refused" not in one):
-        reported += (
+        explained += (
             " Of several branches of a curve the nearest one counts, so the difference may be "
             "too small."
         )
-    return lines([table(head, rows, numbers=(1, 2, 3, 4, 5, 6), stacks=True), html(note(reported))])
+    return lines(
+        [table(head, rows, numbers=(1, 2, 3, 4, 5, 6), stacks=True), html(note(explained))]
+    )
 
 
 def _measured_cells(one: Mapping[str, Any]) -> list[object]:
@@ -223,10 +225,8 @@ def _figures(run: ReportData) -> Iterator[Html]:
 
 def _remarks(summary: Mapping[str, Any]) -> Html:
     """Return the explanations that the analysis gives in sentences."""
-    reported = [
-        typeset(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("explanation") or ()
-    ]
-    return items(reported) if reported else Html("")
+    texts = [typeset(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("explanation") or ()]
+    return items(texts) if texts else Html("")
 
 
 def _case(run: ReportData) -> Iterator[Html]:

@@ -61,9 +61,7 @@ def in_words(seconds: float) -> str:
     if seconds < ROUND[0]:
         return FEW
     if seconds < 0.8 * MINUTE:
-        return (
-            f"{min(ROUND, key=lambda reported: max(reported / seconds, seconds / reported)):.0f} s"
-        )
+        return f"{min(ROUND, key=lambda rounded: max(rounded / seconds, seconds / rounded)):.0f} s"
     for unit, name, beyond in ((MINUTE, "min", HOUR), (HOUR, "h", 2.0 * DAY)):
         if seconds < 0.95 * beyond:
             return f"{_round(seconds / unit)} {name}"
@@ -72,8 +70,8 @@ def in_words(seconds: float) -> str:
 
 def about(seconds: float) -> str:
     """Return the rounded time for use in a sentence: "about 12 min", but "a few seconds"."""
-    reported = in_words(seconds)
-    return reported if reported == FEW else f"about {reported}"
+    words = in_words(seconds)
+    return words if words == FEW else f"about {words}"
 
 
 def _round(number: float) -> str:

@@ -33,5 +33,5 @@ class Isolation:
                 raise
             if what not in self._failed:
                 self._failed.add(what)
-                reported = f"{type(error).__name__}: {one_line(error)}"
-                self._warn(f"{what}: not written ({reported}); the results are complete")
+                reason = f"{type(error).__name__}: {one_line(error)}"
+                self._warn(f"{what}: not written ({reason}); the results are complete")

@@ -116,27 +116,25 @@ def _read(file: int) -> dict[str, object]:
     """Return what the holder wrote; empty if it has not written anything yet."""
     try:
         os.lseek(file, 0, os.SEEK_SET)
-        reported = json.loads(os.read(file, 4096))
+        content = json.loads(os.read(file, 4096))
     except ValueError:
         return {}
-    return reported if isinstance(reported, dict) else {}
+    return content if isinstance(content, dict) else {}
 
 
-def _holder(reported: dict[str, object]) -> str:
-    if not reported:
+def _holder(content: dict[str, object]) -> str:
+    if not content:
         return "another process"
-    return (
-        f"process {reported.get('process')} on {reported.get('host')} since {reported.get('since')}"
-    )
+    return f"process {content.get('process')} on {content.get('host')} since {content.get('since')}"
 
 
 def _write(file: int, path: Path) -> None:
     since = time.strftime("%Y-%m-%d %H:%M:%S")
-    reported = {"process": os.getpid(), "host": socket.gethostname(), "since": since}
+    content = {"process": os.getpid(), "host": socket.gethostname(), "since": since}
     try:
         os.ftruncate(file, 0)
         os.lseek(file, 0, os.SEEK_SET)
-        os.write(file, json.dumps(reported).encode())
+        os.write(file, json.dumps(content).encode())
     except OSError as error:
         error.filename = str(path)
         raise

@@ -71,11 +71,11 @@ class _Stage:
         self._looked = now
         self._forecast.reach(done / max(total, 1))
         at, left = f"{done} of {total} {self._of}".rstrip(), self._forecast.left
-        reported = "" if left is None else f"{about(left)} more"
-        self._row.show(self._forecast.share, at, reported)
+        remaining = "" if left is None else f"{about(left)} more"
+        self._row.show(self._forecast.share, at, remaining)
         if self._say and now - self._printed > LINE:
             self._printed = now
-            self._say(f"{self._name}: {at}, {reported}".rstrip(", "))
+            self._say(f"{self._name}: {at}, {remaining}".rstrip(", "))
 
 
 class Reporter:
@@ -227,15 +227,15 @@ class Reporter:
             course.row.show(course.forecast.share, at, "")
             return
         to_go = self._blended(course.forecast.left, course.forecast.share) + self._after
-        reported = f"{about(to_go)} to go"
-        course.row.show(course.forecast.share, at, reported)
+        remaining = f"{about(to_go)} to go"
+        course.row.show(course.forecast.share, at, remaining)
         whole, before = self.elapsed + to_go, course.reported
         least = FIRST_STEP if course.forecast.steps == 1 else FIRST_WORK
         if course.forecast.measured < least or whole < SHORT_RUN:
             return
         if before is None or max(whole / before, before / whole) > CHANGED:
             where = ", ".join(filter(None, (course.name, at)))
-            (self.say if before is None else self.log)(f"{where}: {reported}")
+            (self.say if before is None else self.log)(f"{where}: {remaining}")
             course.reported = whole
 
 

@@ -151,9 +151,11 @@ def _draw_energy(
     if reference is not None:
         axis.bar(increments, reference, width=0.8, color="#9DC3DE", label=loads)
         before = float(reference.sum())
-        reported = change(before, after, unit)
+        difference = change(before, after, unit)
         against = (
-            f", {reported} against {loads}" if reported.endswith("%") else f", {loads} {before:.3g}"
+            f", {difference} against {loads}"
+            if difference.endswith("%")
+            else f", {loads} {before:.3g}"
         )
     axis.plot(increments, wearing, "D", color=ORANGE, markersize=5, label=wears)
     axis.set_title(f"energy over the cycle: {wears} {after:.4g} {unit}{against}")

@@ -76,14 +76,12 @@ def size_warnings(
 def _unusual(imported: ImportedMesh, side: float) -> str:
     """Return a description of an unusual size, and a unit that would make it usual."""
     least, most = (plain(usual, "mm") for usual in USUAL)
-    reported = (
-        f"bodies of {plain(side, 'mm', 4)}, lengths {imported.unit}; usual: {least} to {most}"
-    )
+    sizes = f"bodies of {plain(side, 'mm', 4)}, lengths {imported.unit}; usual: {least} to {most}"
     for name in UNITS:
         meant = side / imported.unit.size * SIZES[name]
         if USUAL[0] <= meant <= USUAL[1]:
-            return f"{reported}; {plain(meant, 'mm', 4)} if they are in {name}"
-    return reported
+            return f"{sizes}; {plain(meant, 'mm', 4)} if they are in {name}"
+    return sizes
 
 
 def _loads(

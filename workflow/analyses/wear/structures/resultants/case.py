@@ -365,11 +365,11 @@ class ResultantsCase(WearCase):
 def _ranges(loads: LoadHistory, unit: str) -> str:
     """Return the ranges of P, and of Qx and Qy if they act, in a cycle, in words."""
     low, high = float(loads.P.min()), float(loads.P.max())
-    reported = [f"P {between(low, high, unit) if low else f'up to {plain(high, unit)}'}"]
+    ranges = [f"P {between(low, high, unit) if low else f'up to {plain(high, unit)}'}"]
     if low == high:
-        reported = [f"P {plain(high, unit)}"]
+        ranges = [f"P {plain(high, unit)}"]
     for name in ("Qx", "Qy"):
         force = getattr(loads, name)
         if np.abs(force).max() > NOTHING * loads.P.max():
-            reported.append(f"{name} {between(force.min(), force.max(), unit)}")
-    return ", ".join(reported)
+            ranges.append(f"{name} {between(force.min(), force.max(), unit)}")
+    return ", ".join(ranges)
