@@ -1,4 +1,4 @@
-"""What public functions are given: the same numbers held in other ways, and what is no number."""
+"""Inputs of public functions: equal numbers in other containers, and values that are no number."""
 
 from collections.abc import Callable, Iterable
 from typing import Any

@@ -339,6 +339,15 @@ class Observer:
         """Handle the estimated number of ``jumps`` from ``state`` on, which is worn already."""
 
 
+@contextmanager
+def observed(observers: Sequence[Observer], name: str) -> Iterator[None]:
+    """Enter the contexts of all observers while the part ``name`` of a run is computed."""
+    with ExitStack() as stack:
+        for observer in observers:
+            stack.enter_context(observer.stage(name))
+        yield
+
+
 # --- the loop -------------------------------------------------------------------------------------
 
 
@@ -457,12 +466,8 @@ class CoupledWear(Generic[Worn]):
             count = float(np.log1p(count * growth) / np.log1p(growth))
         return max(1, int(np.ceil(count * (1.0 - ROUNDING))))
 
-    @contextmanager
-    def _stage(self, name: Stage) -> Iterator[None]:
-        with ExitStack() as stack:
-            for observer in self.observers:
-                stack.enter_context(observer.stage(name))
-            yield
+    def _stage(self, name: Stage) -> AbstractContextManager[None]:
+        return observed(self.observers, name)
 
     # -- one jump ----------------------------------------------------------------------------------
     def _advance(self, state: CoupledState[Worn]) -> CoupledState[Worn] | None:
@@ -490,9 +495,9 @@ class CoupledWear(Generic[Worn]):
             with self._stage("wear"):
                 if settings.automatic:
                     begun = _in_phase(state.interfaces, cycles)
-                jump_finished = self.contacts.jump(begun, cycles, left)
-            cost = sum((further for _, further in jump_finished), cost)
-            interfaces = tuple(worn for worn, _ in jump_finished)
+                worn = self.contacts.jump(begun, cycles, left)
+            cost = sum((further for _, further in worn), cost)
+            interfaces = tuple(interface for interface, _ in worn)
             shorter = cycles * settings.share_to_stop(state, self.contacts.kinetics(interfaces))
             if shorter == cycles or cycles <= 1.0:
                 break

@@ -193,15 +193,13 @@ def test_observers_see_every_state_once_and_in_order() -> None:
     assert diaries[0].events == diaries[1].events
     seen = [event for event in diaries[0].events if event[0] not in ("stage", "over")]
     assert seen[0] == ("begin", states[0])
-    for number, (jump_started, jump_finished) in enumerate(
-        zip(seen[1::2], seen[2::2], strict=True)
-    ):
-        assert jump_started[0] == "jumping"
-        assert jump_started[1] is states[number]
-        assert jump_finished[1] is states[number]
-        assert jump_finished[2] is states[number + 1]
+    for number, (started, finished) in enumerate(zip(seen[1::2], seen[2::2], strict=True)):
+        assert started[0] == "jumping"
+        assert started[1] is states[number]
+        assert finished[1] is states[number]
+        assert finished[2] is states[number + 1]
         cycles = states[number + 1].cycles[-1] - states[number].cycles[-1]
-        assert jump_started[2] == pytest.approx(cycles)
+        assert started[2] == pytest.approx(cycles)
     assert len(seen) == 1 + 2 * (len(states) - 1)
     stages = [event[1] for event in diaries[0].events if event[0] == "stage"]
     assert stages.count("wear") == stages.count("drift probe") == len(states) - 1

@@ -122,7 +122,7 @@ def test_a_run_can_be_cut_off_again_and_again(every, tmp_path):
 
 
 def test_states_are_saved_as_time_allows(monkeypatch, tmp_path):
-    """Of short steps some are saved, of long ones each, and the last; the clock is simulated."""
+    """Some short steps are saved, every long one, and the last; the clock is simulated."""
     now, cost = [0.0], 0.05
     written: list[int] = []
 

@@ -14,10 +14,11 @@ from wear.joints.periodic.march import SLIP
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import step_control
 from workflow.analyses.vibration.output.outcome import Curves
-from workflow.analyses.vibration.response import LARGEST_ERROR, progress_along
+from workflow.analyses.vibration.response import progress_along
 from workflow.errors import MethodFailed, UserError
 from workflow.layout.declared import Arrays
 from workflow.models.vibration.motions import amplitudes_of
+from workflow.models.vibration.results import LARGEST_ERROR
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import Reporter
 

@@ -20,7 +20,6 @@ from fe_models.dynamics.curves.forced_response import (
 from fe_models.dynamics.curves.further_branches import FurtherBranch
 from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
 from wear.contact.moving import LARGE_STROKE
@@ -38,12 +37,12 @@ from workflow.models.vibration.motions import (
     amplitude_of,
     amplitudes_of,
     motion_columns,
+    peaks_inside,
 )
+from workflow.models.vibration.results import LARGEST_ERROR, ForcedResponse
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import FORECAST, Reporter
 
-# Error of a motion, due to harmonics and samples, that gives a warning if there is no tolerance.
-LARGEST_ERROR = 0.05
 # Usual number of points of a curve while the frequency or the force grows by a factor of e. It
 # weighs as much as this known share of the curve in predictions.
 POINTS, BEGUN = 50, 0.2
@@ -100,16 +99,17 @@ def response_under(
         steps,
     )
     curves = {**curves_of(case, model, branch), **stability.columns}
-    if int(np.argmax(curves["amplitude"][:, -1])) in (0, len(branch.solutions) - 1):
+    amplitudes = curves["amplitude"][:, -1]
+    if not peaks_inside(amplitudes):
         reporter.warn(f"{reported}: no resonance, the largest motion is at an end of the curve")
     reporter.doing(f"{reported}: resonance")
-    resonance = sweep.resonance(model, branch, curves["amplitude"][:, -1], steps)
+    resonance = sweep.resonance(model, branch, amplitudes, steps)
     warn_of_stroke(model, f"{reported}: at resonance", resonance, reporter)
-    found = branch.problem.with_resolution(resonance.resolution)
+    found = ForcedResponse(branch, curves, resonance)
     response = Response(
         force,
         curves,
-        _numbers(case, model, branch, curves, found, resonance) | stability.numbers,
+        _numbers(case, model, found) | stability.numbers,
         nodes=_nodes(branch),
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
         loops=loops_of(case, model, branch, reporter, steps),
@@ -220,28 +220,23 @@ def backbone_of(
 
 
 def _numbers(
-    case: VibrationCase,
-    model: VibratingStructure,
-    branch: ResponseBranch,
-    curves: Arrays,
-    problem: HarmonicBalance,
-    resonance: HarmonicSolution,
+    case: VibrationCase, model: VibratingStructure, found: ForcedResponse
 ) -> dict[str, Any]:
     """Return numbers of the response to a force, for the summary."""
-    every = (*branch.solutions, resonance)
+    branch, resonance = found.branch, found.resonance
     amplitudes, resolution = amplitudes_of(model, resonance), resonance.resolution
     return {
         "resonance": resonance.frequency,
         "amplitude": float(amplitudes[-1]),
         "receptance": float(amplitudes[-1]) / resonance.force,
-        "first_amplitude": float(max(amplitudes[0], curves["amplitude"][:, 0].max())),
+        "first_amplitude": float(max(amplitudes[0], found.columns["amplitude"][:, 0].max())),
         "energy_per_cycle": float(resonance.cycle.dissipated.sum()),
-        "damping": damping_ratio(problem, resonance),
+        "damping": damping_ratio(found.problem, resonance),
         "slip": model.time_share(resonance, SLIP),
         "separated": model.time_share(resonance, SEPARATED),
         "points": len(branch.solutions),
         "folds": [float(branch.curve.parameters[place]) for place in branch.curve.folds],
-        "error": max(motion.error.largest for motion in every if motion.error is not None),
+        "error": found.error,
         "harmonics": list(resolution.harmonics),
         "samples": resolution.samples,
         "message": branch.message,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,7 @@ from fe_models.dynamics.motion import Motion, Start
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
-from wear.coupled import Observer
+from wear.coupled import Observer, observed
 from workflow.errors import MethodFailed, ModelWarning
 from workflow.layout.declared import declared
 from workflow.models.rig.laws import Laws
@@ -125,9 +124,7 @@ class MotionModel:
         """
         import xarray as xr
 
-        with ExitStack() as watching:
-            for observer in observers:
-                watching.enter_context(observer.stage("motion"))
+        with observed(observers, "motion"):
             motion = self.motion(steps)
         if motion.error > LARGEST_ERROR:
             warnings.warn(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from fe_models.dynamics.periodic.harmonics import Resolution
 from sa_solver.steps import COMPUTED, Steps
-from wear.coupled import Observer
+from wear.coupled import Observer, observed
 from workflow.errors import ModelWarning
 from workflow.models.rig.laws import Laws
 from workflow.models.rig.rig_model import RigModel
@@ -121,9 +120,7 @@ class VibrationModel:
         responses = {}
         for force in self.forces:
             name = self.structure.driving.amount.as_text(force)
-            with ExitStack() as watching:
-                for observer in observers:
-                    watching.enter_context(observer.stage(name))
+            with observed(observers, name):
                 responses[name] = self.response(force, steps)
             for message in responses[name].faults():
                 warnings.warn(f"{name}: {message}", ModelWarning, stacklevel=2)

@@ -68,6 +68,11 @@ def amplitude_of(structure: VibratingStructure, solution: HarmonicSolution) -> f
     return float(amplitudes_of(structure, solution)[-1])
 
 
+def peaks_inside(amplitudes: Array) -> bool:
+    """Return whether the largest of amplitudes ``(n,)`` is not at an end of the curve."""
+    return int(np.argmax(amplitudes)) not in (0, len(amplitudes) - 1)
+
+
 def largest_motion(
     structure: VibratingStructure, branch: ResponseBranch, amplitudes: Array
 ) -> HarmonicSolution:
@@ -78,7 +83,7 @@ def largest_motion(
     """
     place = int(np.argmax(amplitudes))
     best = branch.solutions[place]
-    if place in (0, len(amplitudes) - 1):
+    if not peaks_inside(amplitudes):
         return best
     before, after = sorted(branch.frequencies[[place - 1, place + 1]])
     if not before < best.frequency < after:

@@ -6,15 +6,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from fe_models.dynamics.curves.forced_response import ResponseBranch
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
 from workflow.layout.declared import declared
 from workflow.models.vibration.layout import AMPLITUDES, MOTIONS, linear_limits
-from workflow.models.vibration.motions import amplitudes_of
+from workflow.models.vibration.motions import amplitudes_of, peaks_inside
 from workflow.models.vibration.structure import VibratingStructure
 
 if TYPE_CHECKING:
@@ -43,16 +42,15 @@ class ForcedResponse:
         return max(motion.error.largest for motion in every if motion.error is not None)
 
     @property
-    def peaks_inside(self) -> bool:
-        """True if the largest motion of the curve is not at one of its ends."""
-        place = int(np.argmax(self.columns["amplitude"][:, -1]))
-        return place not in (0, len(self.branch.solutions) - 1)
+    def problem(self) -> HarmonicBalance:
+        """The equations at the resolution of the resonance."""
+        return self.branch.problem.with_resolution(self.resonance.resolution)
 
     def faults(self) -> Iterator[str]:
         """Return what makes the curve or its resonance wrong though all solvers converge."""
         if self.branch.message:
             yield self.branch.message
-        if not self.peaks_inside:
+        if not peaks_inside(self.columns["amplitude"][:, -1]):
             yield "no resonance: the largest motion is at an end of the curve"
         if self.error > LARGEST_ERROR:
             yield (
@@ -92,7 +90,6 @@ class VibrationResults:
         import xarray as xr
 
         branch, resonance = response.branch, response.resonance
-        problem = branch.problem.with_resolution(resonance.resolution)
         return xr.Dataset(
             {name: CURVE[name].variable(array) for name, array in response.columns.items()},
             coords={
@@ -102,7 +99,7 @@ class VibrationResults:
             attrs={
                 "resonance": resonance.frequency,
                 "amplitude": float(amplitudes_of(self.structure, resonance)[-1]),
-                "damping": damping_ratio(problem, resonance),
+                "damping": damping_ratio(response.problem, resonance),
                 "error": response.error,
             },
         )

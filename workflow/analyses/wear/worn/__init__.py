@@ -1,1 +1,1 @@
-"""What follows from the worn surfaces: loops, bolts, and the worn structure."""
+"""Loops, bolts and the structure on worn surfaces."""
