@@ -68,19 +68,14 @@ if TYPE_CHECKING:
     from wear.contact.interface import InterfaceContact
     from wear.contact.settings import InterfaceSettings
     from wear.contact.transfer import CellNodes
-    from wear.coupled import (
-        CoupledSettings,
-        CoupledState,
-        CoupledWear,
-        JumpSize,
-        Observer,
-        Stop,
-    )
+    from wear.coupled import CoupledWear
+    from wear.coupled_state import CoupledState, Observer
     from wear.cracking.life import findley, ruiz, smith_watson_topper
     from wear.evolution import EnergyTable
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
     from wear.load_sources import ConstantLoads
+    from wear.schedule import CoupledSettings, JumpSize, Stop
     from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
     from wear.steps.step_errors import ErrorControl
     from wear.steps.steppers import ExplicitStepper, HeunStepper
@@ -121,10 +116,9 @@ __getattr__, __dir__ = lazy_names(
     __name__,
     {
         "contact.contacts": ("Contacts",),
-        "coupled": (
-            *("CoupledSettings", "CoupledState", "CoupledWear"),
-            *("JumpSize", "Observer", "Stop"),
-        ),
+        "coupled": ("CoupledWear",),
+        "coupled_state": ("CoupledState", "Observer"),
+        "schedule": ("CoupledSettings", "JumpSize", "Stop"),
         "evolution": ("CoulombFriction", "EnergyTable"),
         "contact.face_loads": ("CycleLoads",),
         "steps.implicit": ("ImplicitStepper", "SecondOrderStepper"),

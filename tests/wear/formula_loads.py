@@ -10,9 +10,11 @@ from wear.contact.face_loads import CycleLoads
 from wear.contact.interface import InterfaceContact
 from wear.contact.settings import InterfaceSettings
 from wear.contact.transfer import CellNodes
-from wear.coupled import CoupledSettings, CoupledState, CoupledWear
+from wear.coupled import CoupledWear
+from wear.coupled_state import CoupledState
 from wear.laws import EnergyLaw
 from wear.load_sources import ConstantLoads
+from wear.schedule import CoupledSettings
 from wear.steps.implicit import ImplicitStepper
 
 BODY = Material(115e3, 0.29)

@@ -42,9 +42,11 @@ from tests.wear.formula_loads import (
 )
 from wear.contact.drive import Drive
 from wear.contact.interface import InterfaceState, MotionError
-from wear.coupled import CoupledSettings, CoupledWear, JumpSize, Observer
+from wear.coupled import CoupledWear
+from wear.coupled_state import Observer
 from wear.evolution import EnergyTable
 from wear.laws import EnergyLaw, EvolvingLaw
+from wear.schedule import CoupledSettings, JumpSize
 from wear.steps.full_cycle import CycleStart
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.step_errors import ErrorControl

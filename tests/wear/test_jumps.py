@@ -21,8 +21,9 @@ from tests.wear.formula_loads import (
     run,
     run_constant,
 )
-from wear.coupled import AT_STOP, CoupledSettings, CoupledWear, JumpSize, Stop
+from wear.coupled import CoupledWear
 from wear.load_sources import ConstantLoads
+from wear.schedule import AT_STOP, CoupledSettings, JumpSize, Stop
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.step_errors import ErrorControl
 

@@ -11,11 +11,11 @@ from wear.contact.face_loads import CycleLoads
 from wear.contact.interface import InterfaceContact
 from wear.contact.settings import InterfaceSettings
 from wear.contact.transfer import CellNodes
-from wear.coupled import CoupledSettings, JumpSize, Stop
 from wear.cracking.life import findley, ruiz
 from wear.evolution import EnergyTable
 from wear.kinetics import linear_regime
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, SlidingConditions
+from wear.schedule import CoupledSettings, JumpSize, Stop
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.step_errors import ErrorControl
 

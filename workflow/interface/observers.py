@@ -11,7 +11,7 @@ from typing import TextIO
 
 import numpy as np
 
-from wear.coupled import CoupledState, Observer
+from wear.coupled_state import CoupledState, Observer
 from workflow.errors import UserError
 from workflow.shell.folders.packing import PackingError, packed, unpacked
 from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays

@@ -18,9 +18,9 @@ from wear.contact.interface import InterfaceContact, InterfaceState
 from wear.contact.link import StructureLink
 from wear.contact.settings import InterfaceSettings
 from wear.contact.tractions import CycleTractions
-from wear.coupled import CoupledSettings, JumpSize, Stop
 from wear.evolution import CoulombFriction
 from wear.laws import WearLaw
+from wear.schedule import CoupledSettings, JumpSize, Stop
 from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
 from wear.steps.step_errors import ErrorControl, step_errors
 from wear.steps.steppers import ExplicitStepper, Stepper

@@ -12,7 +12,7 @@ from sa_solver.types import Array, LoadHistory
 from wear.contact.contacts import KINETICS
 from wear.contact.face_loads import FaceLoads
 from wear.contact.tractions import ContactFields
-from wear.coupled import CoupledState, Observer
+from wear.coupled_state import CoupledState, Observer
 from wear.steps.step_errors import step_errors
 from wear.surfaces import Surfaces
 from workflow.layout.declared import GRID, Declared, declared

@@ -12,7 +12,9 @@ import numpy as np
 from fe_models.solvers.blas_threads import one_thread
 from sa_solver.errors import InputError
 from wear.contact.interface import FirstContact
-from wear.coupled import CoupledSettings, CoupledState, CoupledWear, Observer
+from wear.coupled import CoupledWear
+from wear.coupled_state import CoupledState, Observer
+from wear.schedule import CoupledSettings
 from workflow.errors import ModelWarning
 from workflow.models.contact import Contact, FaceContact, Wear
 from workflow.models.contacts import FaceContacts

@@ -9,7 +9,8 @@ import pytest
 
 from sa_solver.types import Array
 from tests.conftest import CASES
-from wear.coupled import CoupledState, CoupledWear
+from wear.coupled import CoupledWear
+from wear.coupled_state import CoupledState
 from wear.steps.step_errors import step_errors
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import contact_of, wear_of

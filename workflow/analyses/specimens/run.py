@@ -19,7 +19,7 @@ from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.steps import Steps
 from sa_solver.types import Array, ElasticPair
 from wear.contact.link import LARGEST_RESIDUAL
-from wear.coupled import CoupledState, Observer
+from wear.coupled_state import CoupledState, Observer
 from wear.steps.marching import rest
 from wear.steps.steppers import ExplicitStepper, StabilityError
 from workflow.analyses.specimens.case import SpecimensCase

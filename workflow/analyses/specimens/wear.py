@@ -13,8 +13,10 @@ from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.contact.contacts import LastSolved, SoleContact
 from wear.contact.nodes import NodalContact, NodalState
-from wear.coupled import CoupledState, CoupledWear, Observer, Schedule
+from wear.coupled import CoupledWear
+from wear.coupled_state import CoupledState, Observer
 from wear.laws import WearLaw
+from wear.schedule import Schedule
 from wear.steps.steppers import ExplicitStepper
 
 

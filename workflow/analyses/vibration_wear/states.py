@@ -14,7 +14,9 @@ from fe_models.dynamics.periodic.resolution_error import resolution_error
 from sa_solver.steps import Steps
 from sa_solver.types import Array
 from wear.contact.contacts import SoleContact
-from wear.coupled import CoupledState, CoupledWear, Observer, Schedule
+from wear.coupled import CoupledWear
+from wear.coupled_state import CoupledState, Observer
+from wear.schedule import Schedule
 from wear.steps.steppers import Contact, Stepper
 from wear.worn import State
 from workflow.analyses.vibration.case.vibration_case import VibrationCase

@@ -10,7 +10,8 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 
 from sa_solver.types import Array
-from wear.coupled import CoupledSettings, CoupledState, Observer
+from wear.coupled_state import CoupledState, Observer
+from wear.schedule import CoupledSettings
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.checks.warnings import (
     warn_of_growth,

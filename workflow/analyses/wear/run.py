@@ -12,7 +12,7 @@ from fe_models.solvers.blas_threads import one_thread
 from sa_solver.normal.contact import NormalContactError
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, MotionError
-from wear.coupled import CoupledState
+from wear.coupled_state import CoupledState
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear.budget.finding import ProbeResults, begin_probe_runs
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase

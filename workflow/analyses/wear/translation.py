@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from wear.coupled import JumpSize, Stop
+from wear.schedule import JumpSize, Stop
 from workflow.analyses.wear.case.base import WearCase
 from workflow.errors import UserError
 from workflow.models.contact import Contact, FaceContact, Wear, WearStepper

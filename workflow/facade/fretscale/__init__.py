@@ -114,8 +114,9 @@ if TYPE_CHECKING:
     from fe_models.dovetail import Mission
     from fe_models.geometry.dovetail import Dovetail
     from sa_solver.errors import FretscaleError
-    from wear.coupled import JumpSize, Observer, Stop
+    from wear.coupled_state import Observer
     from wear.evolution import CoulombFriction
+    from wear.schedule import JumpSize, Stop
     from workflow.errors import (
         CaseError,
         MethodFailed,
@@ -203,7 +204,8 @@ __getattr__, __dir__ = lazy_names(
     {
         "fe_models.dovetail": ("Mission",),
         "fe_models.geometry.dovetail": ("Dovetail",),
-        "wear.coupled": ("JumpSize", "Observer", "Stop"),
+        "wear.coupled_state": ("Observer",),
+        "wear.schedule": ("JumpSize", "Stop"),
         "wear.evolution": ("CoulombFriction",),
         "workflow.errors": (
             "CaseError",

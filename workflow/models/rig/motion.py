@@ -14,7 +14,7 @@ from fe_models.dynamics.motion import Motion, Start
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
-from wear.coupled import Observer, observed
+from wear.coupled_state import Observer, observed
 from workflow.errors import MethodFailed, ModelWarning
 from workflow.layout.declared import declared
 from workflow.models.rig.laws import Laws

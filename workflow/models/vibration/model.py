@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from fe_models.dynamics.periodic.harmonics import Resolution
 from sa_solver.steps import COMPUTED, Steps
-from wear.coupled import Observer, observed
+from wear.coupled_state import Observer, observed
 from workflow.errors import ModelWarning
 from workflow.models.rig.laws import Laws
 from workflow.models.rig.rig_model import RigModel

@@ -15,7 +15,9 @@ from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.normal.contact import NormalContactError
 from wear.contact.contacts import Contacts
 from wear.contact.interface import MotionError
-from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.coupled import CoupledWear
+from wear.coupled_state import CoupledState
+from wear.schedule import CoupledSettings, JumpSize
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear.case.base import WearCase

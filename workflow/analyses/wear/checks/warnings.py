@@ -8,7 +8,7 @@ from fe_models.meshes.structure_mesh import Face, Interface
 from fe_models.structure import CLOSED, InterfaceHistory
 from sa_solver.types import ElasticPair, LoadHistory, Mask
 from wear.contact.interface import FirstContact
-from wear.coupled import CoupledState
+from wear.coupled_state import CoupledState
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.case.sections import SIZES, Duration
 from workflow.analyses.wear.output.link_report import report_link

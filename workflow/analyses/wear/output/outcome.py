@@ -12,7 +12,7 @@ from sa_solver.types import Array, LoadHistory
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
 from wear.contact.tractions import CycleTractions, increments_change, increments_error
-from wear.coupled import CoupledState
+from wear.coupled_state import CoupledState
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steps.step_errors import step_errors
 from wear.steps.stepping import ContactFailure

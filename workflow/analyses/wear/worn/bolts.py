@@ -9,7 +9,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
-from wear.coupled import CoupledState
+from wear.coupled_state import CoupledState
 from workflow.layout.declared import Arrays
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads

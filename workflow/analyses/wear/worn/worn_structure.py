@@ -20,7 +20,7 @@ from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.half_space.stress import von_mises
 from sa_solver.transforms.threads import begun
 from sa_solver.types import Array, LoadHistory, Tally
-from wear.coupled import CoupledState
+from wear.coupled_state import CoupledState
 from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.budget.report import arrays_of, summary_of
 from workflow.analyses.wear.output.datasets import put_face
