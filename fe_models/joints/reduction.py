@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from io import RawIOBase
 from pathlib import Path
 from typing import Any
 
@@ -254,18 +253,18 @@ def free_frequencies(
     return np.sqrt(np.abs(np.sort(squares))) / (2.0 * np.pi)
 
 
-def save_reduced(path: Path | RawIOBase, model: ReducedModel) -> None:
-    """Write a model to HDF5, with unit and description of every dataset.
-
-    ``path`` may be an open file.
-    """
+def save_reduced(path: Path, model: ReducedModel) -> None:
+    """Write a model to an HDF5 file."""
     with h5py.File(path, "w") as file:
-        for name, (unit, description) in DATASETS.items():
-            values = getattr(model, name)
-            if values is not None:
-                file.create_dataset(name, data=values).attrs.update(
-                    unit=unit, description=description
-                )
+        write_reduced(file, model)
+
+
+def write_reduced(file: h5py.File, model: ReducedModel) -> None:
+    """Write a model to an open HDF5 file, with unit and description of every dataset."""
+    for name, (unit, description) in DATASETS.items():
+        values = getattr(model, name)
+        if values is not None:
+            file.create_dataset(name, data=values).attrs.update(unit=unit, description=description)
 
 
 def load_reduced(path: Path) -> ReducedModel:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.joints.reduced_contact import masing_loop
-from fe_models.joints.reduction import ReducedModel, save_reduced
+from fe_models.joints.reduction import ReducedModel, write_reduced
 from fe_models.matrices import write_matrices
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import SpecimensCase
@@ -46,8 +46,8 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
         what = "reduced models of the specimens, to build rigs of"
         with folder.filling("reduced", what) as reduced:
             for number, model in enumerate(outcome.model.reduction.models, 1):
-                with replacing_hdf5(reduced / f"body_{number}.h5") as stream:
-                    save_reduced(stream, model)
+                with replacing_hdf5(reduced / f"body_{number}.h5") as file:
+                    write_reduced(file, model)
                 _write_matrices(model, reduced, f"body_{number}", run.case.output.matrix_formats)
         _write_results(outcome, run)
     run.draw(None)  # every run has the same contents

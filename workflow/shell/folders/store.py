@@ -16,7 +16,7 @@ import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import h5py
 
@@ -66,77 +66,39 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     write_text(path, json.dumps(content, indent=2) + "\n")
 
 
-class _Outlet(io.RawIOBase):
-    """File object that accepts every byte even if the disk fails, and stores the ``error``.
-
-    HDF5 aborts the whole process if it cannot write. After a failure the file therefore continues
-    in memory.
-    """
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self.error: OSError | None = None
-
-    def write(self, data: Any) -> int:
-        place, left = self._file.tell(), memoryview(data).cast("B")
-        try:
-            while left:
-                left = left[self._file.write(left) :]
-        except OSError as error:
-            self.error = error
-            self._file.seek(0)
-            self._file = io.BytesIO(self._file.read())
-            self._file.seek(place)
-            self._file.write(data)
-        return len(data)
-
-    def truncate(self, size: int | None = None) -> int:
-        try:
-            return self._file.truncate(size)
-        except OSError as error:
-            self.error = error
-            return self._file.tell() if size is None else size
-
-    def readinto(self, buffer: Any) -> int:
-        data = self._file.read(len(buffer))
-        buffer[: len(data)] = data
-        return len(data)
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._file.tell()
-
-    def readable(self) -> bool:
-        return True
-
-
 @contextmanager
-def replacing_hdf5(path: Path) -> Iterator[io.RawIOBase]:
-    """Yield a file object for h5py that replaces ``path`` once it is written without error.
+def replacing_hdf5(path: Path) -> Iterator[h5py.File]:
+    """Yield an HDF5 file in memory that replaces ``path`` once it is complete.
 
-    Writing to a full disk does not fail at once; OSError is raised at the end.
+    HDF5 never writes to the disk itself: it aborts the whole process if the disk is full, and
+    loses an interruption (Ctrl-C) that arrives while it writes to a Python file object.
     """
-    with replacing(path) as partial, partial.open("wb+", buffering=0) as file:
-        outlet = _Outlet(file)
-        yield outlet
-        if outlet.error is not None:
-            raise outlet.error
+    with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+        yield file
+        image = hdf5_image(file)
+    with replacing(path) as partial:
+        partial.write_bytes(image)
+
+
+def hdf5_image(file: h5py.File) -> bytes:
+    """Return the bytes of an HDF5 file."""
+    file.flush()
+    return file.id.get_file_image()
 
 
 def write_arrays(
     path: Path, arrays: Mapping[str, Any], attributes: Mapping[str, Any] | None = None
 ) -> str:
     """Write named arrays (slashes allowed) and attributes of the root; return the digest."""
-    with replacing_hdf5(path) as stream:
-        with h5py.File(stream, "w", userblock_size=SEAL) as file:
-            for name, values in arrays.items():
-                file.create_dataset(name, data=values)
-            file.attrs.update(attributes or {})
-        digest = _digest(stream, path.name)
-        stream.seek(0)
-        stream.write(digest.encode("ascii"))
+    with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+        for name, values in arrays.items():
+            file.create_dataset(name, data=values)
+        file.attrs.update(attributes or {})
+        image = hdf5_image(file)
+    digest = _digest(io.BytesIO(image), path.name)
+    with replacing(path) as partial, partial.open("wb") as raw:
+        raw.write(digest.encode("ascii").ljust(SEAL, b"\0"))
+        raw.write(image)
     return digest
 
 
@@ -191,6 +153,7 @@ def checked_digest(path: Path) -> str:
     """Return the digest of a file of arrays. Raises :class:`DamagedFile` if it does not match."""
     with opened(path) as raw:
         kept = raw.read(SEAL).rstrip(b"\0").decode("ascii", "replace")
+        raw.seek(SEAL)
         if _digest(raw, path.name) != kept:
             raise DamagedFile(f"{path}: damaged: it differs from what was written")
     return kept
@@ -214,7 +177,6 @@ def json_digest(content: Any) -> str:
     return hashlib.sha256(json.dumps(as_read, sort_keys=True).encode("utf-8")).hexdigest()
 
 
-def _digest(raw: io.BufferedReader | io.RawIOBase, name: str) -> str:
-    """Return the SHA-256 of a file's name and of all bytes after the digest."""
-    raw.seek(SEAL)
-    return hashlib.file_digest(raw, lambda: hashlib.sha256(name.encode("utf-8"))).hexdigest()
+def _digest(rest: io.BufferedIOBase, name: str) -> str:
+    """Return the SHA-256 of a file's name and of all remaining bytes of its content."""
+    return hashlib.file_digest(rest, lambda: hashlib.sha256(name.encode("utf-8"))).hexdigest()

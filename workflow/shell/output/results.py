@@ -117,7 +117,7 @@ class ResultsWriter:
 @contextmanager
 def writing(path: Path, layout: Layout, line: bool = False) -> Iterator[ResultsWriter]:
     """Write an HDF5 file, which appears under its name once it is complete."""
-    with replacing_hdf5(path) as stream, h5py.File(stream, "w") as file:
+    with replacing_hdf5(path) as file:
         yield ResultsWriter(file, layout, line)
 
 
