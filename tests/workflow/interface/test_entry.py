@@ -173,7 +173,8 @@ def test_a_notebook_runs_is_stopped_and_goes_on(tmp_path, monkeypatch):
             assert time.monotonic() < end
             time.sleep(0.05)
         kernel.interrupt_kernel()
-        assert answer(client, asked)["ename"] == "KeyboardInterrupt"
+        stopped = answer(client, asked)
+        assert stopped["ename"] == "KeyboardInterrupt", "\n".join(stopped["traceback"])
         again = answer(client, client.execute(RUN))
         assert again["status"] == "ok", again
     finally:
