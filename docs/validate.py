@@ -302,7 +302,7 @@ def scars() -> list[Comparison]:
         Comparison(
             test, "worn area of the block [1e-3 mm²]", area, name,
             at("interface.volume_1", 1e-3, "interface.error.volume.total"), "calibrated",
-            "k was found by tests of this kind",
+            "k counts as fitted to these tests",
         ),
     ]  # fmt: skip
 
@@ -448,9 +448,7 @@ def bolted_joints() -> list[Comparison]:
 
 # --- table --------------------------------------------------------------------------------------
 
-HEADINGS = (
-    *("test", "quantity", "measured", "computed", "kind", "deviation", "within", "likely cause"),
-)
+HEADINGS = (*("test", "quantity", "measured", "computed", "kind", "deviation", "likely cause"),)
 # Digits of values without an error, and relative error below which an error is not shown.
 DIGITS, LEAST = 3, 1e-3
 
@@ -461,8 +459,10 @@ def table(results: Mapping[Comparison, tuple[float, float | None]]) -> list[list
     for entry, (value, error) in results.items():
         measured, around = entry.measured
         deviation = 100.0 * (value / measured - 1.0)
-        known = [part for part in (around, error) if part is not None]
-        within = "yes" if abs(value - measured) <= sum(known) else "no"
+        within = ""
+        if around is not None:
+            inside = abs(value - measured) <= around + (error or 0.0)
+            within = " (within)" if inside else " (beyond)"
         rows.append(
             [
                 entry.test,
@@ -470,8 +470,7 @@ def table(results: Mapping[Comparison, tuple[float, float | None]]) -> list[list
                 number(measured, around),
                 number(value, error),
                 entry.kind,
-                f"{deviation:+.2g} %".replace("-", "−"),
-                within if around is not None else "?",
+                f"{deviation:+.2g} %".replace("-", "−") + within,
                 entry.cause,
             ]
         )
