@@ -49,8 +49,9 @@ docs-gallery: $(DOCUMENTABLE)
 	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/draw_gallery.py out/gallery
 
 docs-figures: $(DOCUMENTABLE)
-	@echo 'fretscale: the runs and charts that the pages show: about an hour and a quarter of one core.'
+	@echo 'fretscale: the runs and charts that the pages show: about an hour and a half of one core.'
 	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/draw_figures.py out/figures
+	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/validate.py out/validation
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/method_charts.py
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python docs/cost_charts.py
 

@@ -42,7 +42,8 @@ HEADINGS = {
 INTRODUCTION = """\
 # Gallery
 
-Every case that is shipped, with a figure of its run. `fretscale verify CASE` compares it with what
+Every case that is shipped, with a figure of its run; those of measured wear are in
+[](../validation.md). `fretscale verify CASE` compares it with what
 it lists under `expect:`, in the units of the list, and shows of what kind every value is: `printed`
 by a publication, in numbers or words (its `source` says where, and what is a mean of what is
 printed), `closed_form` (a formula, a balance or a limit), `independent` (by another method), or

@@ -16,7 +16,9 @@ from workflow.fit.template import FITS, fit_template
 from workflow.kinds import about, kinds, parse_case, template
 from workflow.sweep.template import sweep_template
 
-FILES = sorted([*CASES.glob("*.yaml"), *CASES.glob("sweeps/*.yaml")])
+FILES = sorted(
+    path for folder in ("", "sweeps/", "validation/") for path in CASES.glob(f"{folder}*.yaml")
+)
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from workflow.case.text.plain import between, plain
 from workflow.cli import cli
 from workflow.kinds import kinds, load_case, parse_case, template
 
-CASES = sorted(Path("cases").glob("*.yaml"))
+CASES = sorted([*Path("cases").glob("*.yaml"), *Path("cases/validation").glob("*.yaml")])
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)

@@ -306,7 +306,8 @@ def test_depths_in_the_plane_are_not_compared_with_those_in_space():
 
 # --- axes ---------------------------------------------------------------------------------------
 
-CASES = sorted((Path(__file__).parents[3] / "cases").glob("*.yaml"))
+FOLDER = Path(__file__).parents[3] / "cases"
+CASES = sorted([*FOLDER.glob("*.yaml"), *FOLDER.glob("validation/*.yaml")])
 # Of a joint alone nothing can be charted: its test is as good as it is asked to be.
 CHARTED = [path for path in CASES if "kind: joint" not in path.read_text("utf-8")]
 

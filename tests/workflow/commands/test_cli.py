@@ -59,7 +59,11 @@ assert "pint" not in sys.modules
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-@pytest.mark.parametrize("path", sorted(CASES.glob("*.yaml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    sorted([*CASES.glob("*.yaml"), *CASES.glob("validation/*.yaml")]),
+    ids=lambda path: path.stem,
+)
 def test_cases_of_the_repository_check(path):
     result = invoke("check", path)
     assert (result.exit_code, result.stderr) == (0, "")
