@@ -10,7 +10,7 @@ PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts
 # Words of a sentence, and of a page that explains, above which a reader loses the thread.
 LONGEST_SENTENCE, LONGEST_PAGE = 35, 2000
 # Starts whose meaning depends on an earlier sentence, or comes later in the same one.
-UNCLEAR = re.compile(r"(That|Those|What|Whether|As|Of) ")
+UNCLEAR = re.compile(r"(That|Those|What|Whether|Of) ")
 BLOCK = re.compile(r"^---$.*?^---$|^(```|~~~).*?^\1|^\$\$.*?^\$\$|<[^>]+>", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
 NOT_PROSE = re.compile(r"^\s*(\||#|\(|\{|:|!\[)")
@@ -23,7 +23,7 @@ def sentences(path):
     for part in re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) )", text):
         if part.strip() and not NOT_PROSE.match(part):
             clean = re.sub(r"\s+", " ", LINK.sub(r"\1", part)).strip(" -*")
-            prose += re.split(r"(?<=[.?!:;])\s+(?=[A-Z`*])", clean)
+            prose += re.split(r"(?<=[\w)`%*][.?!:;])\s+", clean)
     return [sentence.strip("*_ ") for sentence in prose if re.search("[a-z]{2}", sentence)]
 
 
