@@ -84,6 +84,7 @@ html_math_renderer = "mathml"
 html_title = f"fretscale {release}"
 html_static_path = ["_static"]
 html_css_files = ["fretscale.css"]
+html_js_files = ["filter_table.js"]
 html_show_sphinx = False
 html_theme_options = {"navigation_with_keys": True}
 copybutton_exclude = ".linenos, .gp"

@@ -77,8 +77,8 @@ def test_what_instruments_write_has_its_heights_and_pitch(name, tmp_path):
 def test_all_formats_of_instruments_are_in_the_corpus_and_the_documentation():
     packed = {"." + name.split(".")[1] for name in scan_corpus.BINARY}
     assert packed == set(PROFILOMETER)
-    text = (Path(__file__).parents[3] / "docs" / "analyses.md").read_text("utf-8")
-    files = text[text.index("- **Files of") : text.index("- **Plausible.**")]
+    text = (Path(__file__).parents[3] / "docs" / "guides" / "surfaces.md").read_text("utf-8")
+    files = text[text.index("- **Files of") : text.index("- **Refused as damaged")]
     refused = {".nms", ".zmg", ".zon"}
     assert set(re.findall(r"`(\.\w+)`", files)) == {*ENDINGS, *refused}
 
