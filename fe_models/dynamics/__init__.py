@@ -41,7 +41,8 @@ from sa_solver.lazy import lazy_names
 if TYPE_CHECKING:
     from fe_models.dynamics.curves.crossings import motions_at
     from fe_models.dynamics.curves.curve_steps import ContinuationControl
-    from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
+    from fe_models.dynamics.curves.forced_response import along_force, along_frequency
+    from fe_models.dynamics.curves.motion_recorder import Accuracy
     from fe_models.dynamics.curves.nonlinear_mode import LinearMode, along_nonlinear_mode
     from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
     from fe_models.dynamics.damping import damped
@@ -114,10 +115,10 @@ __getattr__, __dir__ = lazy_names(
         ),
         "stability.floquet": ("Floquet",),
         "curves.forced_response": (
-            "Accuracy",
             "along_force",
             "along_frequency",
         ),
+        "curves.motion_recorder": ("Accuracy",),
         "transient.free_decay": ("ring_down",),
         "periodic.harmonic_balance": ("HarmonicBalance",),
         "periodic.harmonics": ("Resolution",),
