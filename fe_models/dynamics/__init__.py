@@ -100,46 +100,4 @@ __all__ = [
     "unit_force",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "curves.curve_steps": ("ContinuationControl",),
-        "curves.crossings": ("motions_at",),
-        "damping": ("damped",),
-        "excitation": (
-            "CombinedForces",
-            "ConstantForce",
-            "HammerBlow",
-            "HarmonicForce",
-            "RecordedForce",
-        ),
-        "stability.floquet": ("Floquet",),
-        "curves.forced_response": (
-            "along_force",
-            "along_frequency",
-        ),
-        "curves.motion_recorder": ("Accuracy",),
-        "transient.free_decay": ("ring_down",),
-        "periodic.harmonic_balance": ("HarmonicBalance",),
-        "periodic.harmonics": ("Resolution",),
-        "periodic.load": ("PeriodicLoad",),
-        "transient.impact_hammer": ("frequency_response",),
-        "model": ("DynamicModel",),
-        "transient.newmark": (
-            "TimeStepControl",
-            "integrate",
-        ),
-        "curves.nonlinear_mode": (
-            "LinearMode",
-            "along_nonlinear_mode",
-        ),
-        "curves.phase_resonance": ("along_phase_resonance",),
-        "rig": (
-            "Link",
-            "lumped_rig",
-            "natural_frequencies",
-            "reduced_rig",
-            "unit_force",
-        ),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)
