@@ -62,29 +62,4 @@ __all__ = [
     "reduce_body",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "loads.constraints": ("Constraints",),
-        "elasticity.body": ("ElasticBody",),
-        "joints.friction": ("FrictionalJoint",),
-        "joints.joint": ("JointStiffness",),
-        "solvers.linear_solver": ("SolverError",),
-        "meshes.structure_mesh": (
-            "Body",
-            "Interface",
-            "MeshError",
-            "StructureMesh",
-        ),
-        "joints.reduced_contact": (
-            "FrettingConditions",
-            "ReducedPair",
-        ),
-        "joints.reduction": (
-            "ReducedModel",
-            "reduce_body",
-        ),
-        "structure": ("Structure",),
-        "supported_body": ("SupportedBody",),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)

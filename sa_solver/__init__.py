@@ -87,21 +87,4 @@ __all__ = [
     "von_mises",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "contact": ("FrictionalContact",),
-        "contact_state": ("ContactLoad",),
-        "dissimilar.contact": ("CoupledContact",),
-        "errors": ("ConvergenceError", "FretscaleError", "InputError"),
-        "half_space.operator": ("HalfSpace",),
-        "cycles.history": ("ContactLoadPath", "march_history"),
-        "normal.contact": ("NormalContact",),
-        "cycles.partial_slip": ("partial_slip_curve",),
-        "half_space.stress": ("principal_stresses", "von_mises"),
-        "half_space.subsurface": ("SubsurfaceStress",),
-        "tangential.contact": ("TangentialContact",),
-        "cycles.tangential_loop": ("LoopPath", "march_loop"),
-        "types": ("ElasticPair", "Frame", "Grid", "LoadHistory", "Material"),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)

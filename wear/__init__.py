@@ -112,25 +112,4 @@ __all__ = [
     "smith_watson_topper",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "contact.contacts": ("Contacts",),
-        "coupled": ("CoupledWear",),
-        "coupled_state": ("CoupledState", "Observer"),
-        "schedule": ("CoupledSettings", "JumpSize", "Stop"),
-        "evolution": ("CoulombFriction", "EnergyTable"),
-        "contact.face_loads": ("CycleLoads",),
-        "steps.implicit": ("ImplicitStepper", "SecondOrderStepper"),
-        "contact.interface": ("InterfaceContact",),
-        "contact.settings": ("InterfaceSettings",),
-        "kinetics": ("linear_regime",),
-        "load_sources": ("ConstantLoads",),
-        "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
-        "cracking.life": ("findley", "ruiz", "smith_watson_topper"),
-        "contact.transfer": ("CellNodes",),
-        "steps.step_errors": ("ErrorControl",),
-        "steps.steppers": ("ExplicitStepper", "HeunStepper"),
-        "steps.stepping": ("ContactFailure",),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)

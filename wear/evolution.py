@@ -97,7 +97,8 @@ class CoulombFriction:
 
     Examples
     --------
-    >>> from wear import CoulombFriction, EnergyTable
+    >>> from wear import EnergyTable
+    >>> from wear.evolution import CoulombFriction
     >>> friction = CoulombFriction(0.4, EnergyTable(energy=(0.0, 1e6), factor=(1.0, 1.5)))
     >>> print(f"{friction.at(0.0):.1f} {friction.at(1e6):.1f}")
     0.4 0.6

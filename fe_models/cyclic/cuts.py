@@ -24,8 +24,9 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fe_models.elasticity.body import ElasticBody
-from fe_models.joints.tied_faces import ENDS, tied_projection
+from fe_models.joints.tied_faces import tied_projection
 from fe_models.loads.constraints import Constraints
+from fe_models.meshes.curved_face import EDGES
 from fe_models.meshes.structure_mesh import Body, MeshError
 from sa_solver.types import Array, Frame, Indices, Mask
 
@@ -358,7 +359,7 @@ def _facets(body: Body, names: Sequence[str]) -> Indices:
 def _bent(elastic: ElasticBody, facets: Indices) -> float:
     """Return the largest distance of midside nodes of facets from their edges' middles [mm]."""
     nodes, corners = elastic.facet_nodes(facets), elastic.dimension
-    middles = (elastic.nodes[nodes[:, [a, b]]].mean(axis=1) for a, b in ENDS[corners])
+    middles = (elastic.nodes[nodes[:, [a, b]]].mean(axis=1) for a, b in EDGES[corners])
     off = np.stack(list(middles), axis=1) - elastic.nodes[nodes[:, corners:]]
     return float(np.linalg.norm(off, axis=2).max())
 

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from fe_models.cyclic.cuts import Cuts
 from fe_models.elasticity.body import ElasticBody
 from fe_models.elasticity.recovery import StressRecovery
-from fe_models.meshes.structure_mesh import Body, named_mesh
+from fe_models.meshes.structure_mesh import Body, mesh_edges, named_mesh
 from sa_solver.types import Array, Indices, Mask
 
 if TYPE_CHECKING:
@@ -192,15 +192,14 @@ class _Beyond:
 def _curved_edges(body: Body, elements: Indices) -> tuple[Indices, Array]:
     """Return the edges of some elements: their ends ``(m, 2)`` and midside points ``(m, 3)``."""
     mesh = body.mesh
-    ends = mesh.edges if mesh.dim() == 3 else mesh.facets
     used = np.unique(body.element_nodes[elements][:, mesh.t.shape[0] :]) - mesh.nvertices
-    return ends[:, used].T, body.nodes[mesh.nvertices + used]
+    return mesh_edges(mesh)[used], body.nodes[mesh.nvertices + used]
 
 
 def _midsides(mesh: MeshTet | MeshTri, edges: Sequence[tuple[Indices, Array]]) -> Array:
     """Return the midside points ``(m, 3)`` of a mesh's edges from ``edges`` with known ones."""
     known = np.sort(np.concatenate([ends for ends, _ in edges]), axis=1)
-    asked = np.sort((mesh.edges if mesh.dim() == 3 else mesh.facets).T, axis=1)
+    asked = np.sort(mesh_edges(mesh), axis=1)
     key = np.array([mesh.nvertices, 1])
     keys, first = np.unique(known @ key, return_index=True)
     middles = np.concatenate([middles for _, middles in edges])

@@ -41,7 +41,8 @@ from sa_solver.lazy import lazy_names
 if TYPE_CHECKING:
     from fe_models.dynamics.curves.crossings import motions_at
     from fe_models.dynamics.curves.curve_steps import ContinuationControl
-    from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
+    from fe_models.dynamics.curves.forced_response import along_force, along_frequency
+    from fe_models.dynamics.curves.motion_recorder import Accuracy
     from fe_models.dynamics.curves.nonlinear_mode import LinearMode, along_nonlinear_mode
     from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
     from fe_models.dynamics.damping import damped
@@ -99,46 +100,4 @@ __all__ = [
     "unit_force",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "curves.curve_steps": ("ContinuationControl",),
-        "curves.crossings": ("motions_at",),
-        "damping": ("damped",),
-        "excitation": (
-            "CombinedForces",
-            "ConstantForce",
-            "HammerBlow",
-            "HarmonicForce",
-            "RecordedForce",
-        ),
-        "stability.floquet": ("Floquet",),
-        "curves.forced_response": (
-            "Accuracy",
-            "along_force",
-            "along_frequency",
-        ),
-        "transient.free_decay": ("ring_down",),
-        "periodic.harmonic_balance": ("HarmonicBalance",),
-        "periodic.harmonics": ("Resolution",),
-        "periodic.load": ("PeriodicLoad",),
-        "transient.impact_hammer": ("frequency_response",),
-        "model": ("DynamicModel",),
-        "transient.newmark": (
-            "TimeStepControl",
-            "integrate",
-        ),
-        "curves.nonlinear_mode": (
-            "LinearMode",
-            "along_nonlinear_mode",
-        ),
-        "curves.phase_resonance": ("along_phase_resonance",),
-        "rig": (
-            "Link",
-            "lumped_rig",
-            "natural_frequencies",
-            "reduced_rig",
-            "unit_force",
-        ),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.model import DynamicModel, stiffened
 from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.periodic.joints import Cycle, PeriodicJoints
 from fe_models.dynamics.periodic.receptance import Receptance
@@ -37,11 +37,7 @@ class SpringJoints:
     @cached_property
     def stiffened(self) -> Receptance:
         """Receptance of the structure with these springs; damping between modes is left out."""
-        connection = self.model.connection
-        by_joint = connection.reshape(*self.tangents.shape[:2], -1)
-        springs = (self.tangents @ by_joint).reshape(connection.shape)
-        stiffness = self.model.stiffness + connection.T @ springs
-        return Receptance(replace(self.model, stiffness=stiffness), mixed=False)
+        return Receptance(stiffened(self.model, self.tangents), mixed=False)
 
 
 class Rest:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from sa_solver import checks
@@ -85,3 +85,11 @@ class Joints(Protocol):
     def directions(self) -> int: ...
     def rest(self, joints: int) -> Array: ...
     def respond(self, state: Array, increment: Array) -> IncrementResponse: ...
+
+
+def stiffened(model: DynamicModel, tangents: Array) -> DynamicModel:
+    """Return a model with springs ``(j, d, d)`` [N/mm] in parallel to its joints."""
+    connection = model.connection
+    by_joint = connection.reshape(*tangents.shape[:2], -1)
+    springs = (tangents @ by_joint).reshape(connection.shape)
+    return replace(model, stiffness=model.stiffness + connection.conj().T @ springs)

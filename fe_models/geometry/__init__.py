@@ -32,15 +32,4 @@ __all__ = [
     "read_bodies",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "dovetail": ("Dovetail",),
-        "imported": (
-            "ImportedMesh",
-            "describe_bodies",
-            "read_bodies",
-        ),
-        "specimens": ("Specimen",),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)

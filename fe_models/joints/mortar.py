@@ -120,12 +120,22 @@ def mortar_projection(
     )
     # Bulges are of degree 2 and ψ of degree 1, so their product needs a rule of degree 4.
     overlap = overlap_of(slave, master, 2 if surfaces is None else 4)
-    dual, integrals = _dual_functions(slave, overlap)
+    shapes = slave.shapes(overlap.slave, overlap.points)
+    dual, integrals = dual_functions(shapes, overlap, slave.sizes, SLIVER_SHARE)
+    share = float(np.max(integrals.sum(axis=1) / slave.sizes))
+    if share > FOLDED_SHARE:
+        raise MeshError(
+            f"a facet of one face meets the other {share:.3g} times along the contact's normal: a "
+            "contact face must not fold over itself"
+        )
     areas = slave.scatter(integrals)
     covered = areas / slave.nodal_areas
     kept = covered > COVERED_SHARE
     scale = np.divide(1.0, areas, out=np.zeros_like(areas), where=kept)
-    projection = (sp.diags(scale) @ _coupling(slave, master, overlap, dual)).tocsr()
+    tested = master.shapes(overlap.master, overlap.points)
+    shape = slave.nodes, master.nodes
+    coupling = coupling_of(overlap, dual, tested, slave.facets, master.facets, shape)
+    projection = (sp.diags(scale) @ coupling).tocsr()
     projection.eliminate_zeros()
     gap = np.where(kept, slave_points[:, 2] - projection @ master_points[:, 2], np.inf)
     bulged = None
@@ -399,39 +409,50 @@ def _clip(polygons: Array, start: Array, end: Array) -> Array:
     return clipped
 
 
-def _dual_functions(slave: ProjectedFace, overlap: Overlap) -> tuple[Array, Array]:
-    """Return ψ at the Gauss points ``(q, corners)``, and ∫φ over the covered part ``(m, corners)``.
+def dual_functions(
+    shapes: Array, overlap: Overlap, sizes: Array, sliver_share: float
+) -> tuple[Array, Array]:
+    """Return ψ at the Gauss points ``(q, k)``, and ∫φ over the covered part ``(m, k)``.
 
-    On each facet ψ_i = Σ_j A_ij φ_j with A = diag(∫φ) (∫φφᵀ)⁻¹. Raises :class:`MeshError` if a
-    facet is covered more than once.
+    On each facet ψ_i = Σ_j A_ij φ_j with A = diag(∫φ) (∫φφᵀ)⁻¹.
+
+    Parameters
+    ----------
+    shapes
+        Functions φ of the slave ``(q, k)`` at the Gauss points.
+    overlap
+        Gauss points on the covered part.
+    sizes
+        Areas of the slave's facets ``(m,)``.
+    sliver_share
+        Share of its area below which a covered part of a facet is left out.
     """
-    shapes = slave.shapes(overlap.slave, overlap.points)
-    mass = np.zeros((len(slave.facets), shapes.shape[1], shapes.shape[1]))
+    mass = np.zeros((len(sizes), shapes.shape[1], shapes.shape[1]))
     np.add.at(mass, overlap.slave, np.einsum("q,qi,qj->qij", overlap.weights, shapes, shapes))
     integrals = mass.sum(axis=2)
-    share = integrals.sum(axis=1) / slave.sizes
-    if share.max() > FOLDED_SHARE:
-        raise MeshError(
-            f"a facet of one face meets the other {share.max():.3g} times along the contact's "
-            "normal: a contact face must not fold over itself"
-        )
-    used = share > SLIVER_SHARE
+    used = integrals.sum(axis=1) > sliver_share * sizes
     integrals[~used] = 0.0
     factors = np.zeros_like(mass)
     factors[used] = np.linalg.solve(mass[used], integrals[used, :, None] * np.eye(mass.shape[1]))
     return np.einsum("qji,qj->qi", factors[overlap.slave], shapes), integrals
 
 
-def _coupling(
-    slave: ProjectedFace, master: ProjectedFace, overlap: Overlap, dual: Array
+def coupling_of(
+    overlap: Overlap,
+    dual: Array,
+    tested: Array,
+    slave_nodes: Indices,
+    master_nodes: Indices,
+    shape: tuple[int, int],
 ) -> sp.csr_matrix:
-    """Return M ``(n, n_master)`` from the values of the dual functions ``(q, corners)``."""
-    shapes = master.shapes(overlap.master, overlap.points)
-    values = np.einsum("q,qi,qk->qik", overlap.weights, dual, shapes)
-    rows = np.broadcast_to(slave.facets[overlap.slave][:, :, None], values.shape)
-    columns = np.broadcast_to(master.facets[overlap.master][:, None, :], values.shape)
-    places = rows.ravel(), columns.ravel()
-    return sp.csr_matrix((values.ravel(), places), shape=(slave.nodes, master.nodes))
+    """Return M ``shape`` of the dual functions ``(q, k)`` and the master's functions ``(q, l)``.
+
+    ``slave_nodes`` ``(m, k)`` and ``master_nodes`` ``(n, l)`` are the nodes of the facets.
+    """
+    values = np.einsum("q,qi,qk->qik", overlap.weights, dual, tested)
+    rows = np.broadcast_to(slave_nodes[overlap.slave][:, :, None], values.shape)
+    columns = np.broadcast_to(master_nodes[overlap.master][:, None, :], values.shape)
+    return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape)
 
 
 def _bulge_integrals(

@@ -19,7 +19,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.joints.mortar import Overlap, ProjectedFace, overlap_of
+from fe_models.joints.mortar import ProjectedFace, coupling_of, dual_functions, overlap_of
+from fe_models.meshes.curved_face import EDGES
 from sa_solver.types import Array, Indices
 
 # Share α of a midside's function that corners take (Popp et al. 2012).
@@ -27,8 +28,6 @@ SHIFTED = 0.2
 # A facet covered by a smaller share of its area is left out: the displacements at its nodes can
 # hardly be told apart from their values on a sliver, so its ψ would be ill-conditioned.
 SLIVER_SHARE = 0.05
-# Corners at the ends of each edge, in the order of the midsides, by the number of corners.
-ENDS = {2: ((0, 1),), 3: ((0, 1), (1, 2), (2, 0))}
 
 
 def tied_projection(
@@ -71,16 +70,11 @@ def tied_projection(
     corners = slave.facets.shape[1]
     mixing = _mixing(corners, order)
     shapes = _functions(slave.shapes(overlap.slave, overlap.points), order) @ mixing
-    dual, integrals = _dual(shapes, overlap, slave.sizes)
+    dual, integrals = dual_functions(shapes, overlap, slave.sizes, SLIVER_SHARE)
     areas = np.bincount(slave_nodes.ravel(), integrals.ravel(), minlength=len(slave_points))
     tested = _functions(master.shapes(overlap.master, overlap.points), order)
-    values = np.einsum("q,qi,qk->qik", overlap.weights, dual, tested)
-    rows = np.broadcast_to(slave_nodes[overlap.slave][:, :, None], values.shape)
-    columns = np.broadcast_to(master_nodes[overlap.master][:, None, :], values.shape)
-    coupling = sp.csr_matrix(
-        (values.ravel(), (rows.ravel(), columns.ravel())),
-        shape=(len(slave_points), len(master_points)),
-    )
+    shape = len(slave_points), len(master_points)
+    coupling = coupling_of(overlap, dual, tested, slave_nodes, master_nodes, shape)
     scale = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0.0)
     follows = _nodal(slave_nodes, mixing, len(slave_points)) @ sp.diags(scale) @ coupling
     return follows.tocsr(), float(areas.sum() / slave.sizes.sum())
@@ -102,7 +96,7 @@ def _functions(linear: Array, order: int) -> Array:
     """Return the elements' functions ``(q, k)`` from those of the corners ``(q, corners)``."""
     if order == 1:
         return linear
-    middles = [4.0 * linear[:, a] * linear[:, b] for a, b in ENDS[linear.shape[1]]]
+    middles = [4.0 * linear[:, a] * linear[:, b] for a, b in EDGES[linear.shape[1]]]
     return np.column_stack([linear * (2.0 * linear - 1.0), *middles])
 
 
@@ -110,7 +104,7 @@ def _mixing(corners: int, order: int) -> Array:
     """Return the matrix ``(k, k)`` that turns the functions φ ``(k,)`` of a facet into φ̃."""
     if order == 1:
         return np.eye(corners)
-    ends = ENDS[corners]
+    ends = EDGES[corners]
     mixing = np.eye(corners + len(ends))
     for middle, (a, b) in enumerate(ends, start=corners):
         mixing[middle, [a, b]] = SHIFTED
@@ -128,18 +122,3 @@ def _nodal(facet_nodes: Indices, mixing: Array, count: int) -> sp.csr_matrix:
     # Facets that share an edge have the same values for it, which must count once.
     places, first = np.unique(places, axis=1, return_index=True)
     return sp.csr_matrix((values[first], places), shape=(count, count))
-
-
-def _dual(shapes: Array, overlap: Overlap, sizes: Array) -> tuple[Array, Array]:
-    """Return ψ at the Gauss points ``(q, k)``, and ∫φ̃ over the covered part ``(m, k)``.
-
-    ``shapes`` are φ̃ ``(q, k)``, ``sizes`` ``(m,)`` the areas of the slave's facets.
-    """
-    mass = np.zeros((len(sizes), shapes.shape[1], shapes.shape[1]))
-    np.add.at(mass, overlap.slave, np.einsum("q,qi,qj->qij", overlap.weights, shapes, shapes))
-    integrals = mass.sum(axis=2)
-    used = integrals.sum(axis=1) > SLIVER_SHARE * sizes
-    integrals[~used] = 0.0
-    factors = np.zeros_like(mass)
-    factors[used] = np.linalg.solve(mass[used], integrals[used, :, None] * np.eye(mass.shape[1]))
-    return np.einsum("qji,qj->qi", factors[overlap.slave], shapes), integrals

@@ -68,20 +68,4 @@ __all__ = [
     "write_matrices",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "export": ("write_matrices",),
-        "parts": ("read_matrix_file",),
-        "reduction": (
-            "check_definite",
-            "lowest_frequencies",
-            "on_all",
-            "on_retained",
-            "with_light_motions",
-            "without_massless",
-        ),
-        "structure": ("FileUnits", "GivenUnknowns", "ExternalMatrices", "external_matrices"),
-        "unknowns": ("MatrixError", "MatrixFile", "Unknown"),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)

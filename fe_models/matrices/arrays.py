@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -92,12 +93,8 @@ def _file(
         modes = range(1, np.size(description.get(FREQUENCIES, ())) + 1)
         unknowns += tuple(Unknown(f"mode {mode}", MODAL) for mode in modes)
         places = None if places is None else _placed(path, places, len(unknowns))
-    matrices = {name: _later(read, name) for name in names if name not in (NAMES, PLACES)}
+    matrices = {name: partial(read, name) for name in names if name not in (NAMES, PLACES)}
     return MatrixFile(path, matrices, unknowns, places if unknowns else None)
-
-
-def _later(read: Callable[[str], Values], name: str) -> Callable[[], Values]:
-    return lambda: read(name)
 
 
 def _text(name: Any) -> str:

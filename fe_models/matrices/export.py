@@ -67,7 +67,8 @@ def _matrices(model: ReducedModel) -> dict[str, Array]:
 
 
 def _unknowns(model: ReducedModel) -> list[Unknown]:
-    assert model.names is not None  # asked for before
+    # The caller has checked that there are names.
+    assert model.names is not None
     modes = range(1, len(model.frequencies) + 1)
     return [*map(unknown_of, model.names), *(Unknown(f"mode {mode}", MODAL) for mode in modes)]
 

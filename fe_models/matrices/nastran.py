@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections import defaultdict
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ def read_punch(path: Path) -> MatrixFile:
     labels = sorted({label for matrix in matrices.values() for label in matrix.labels()})
     row = {label: k for k, label in enumerate(labels)}
     unknowns: tuple[Unknown, ...] = tuple(by_number(path, *label) for label in labels)
-    return MatrixFile(path, {n: _later(m, row) for n, m in matrices.items()}, unknowns)
+    return MatrixFile(path, {n: partial(m.values, row) for n, m in matrices.items()}, unknowns)
 
 
 def read_op4(path: Path) -> MatrixFile:
@@ -72,10 +73,6 @@ def read_op4(path: Path) -> MatrixFile:
 
 def _plain(values: Any) -> Callable[[], Values]:
     return lambda: values.tocsr() if sp.issparse(values) else np.asarray(values)
-
-
-def _later(matrix: _Dmig, row: dict[Label, int]) -> Callable[[], Values]:
-    return lambda: matrix.values(row)
 
 
 class _Dmig:

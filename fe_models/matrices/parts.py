@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from fe_models.matrices.arrays import read_hdf5, read_mat, read_npz
 from fe_models.matrices.nastran import read_op4, read_punch
 from fe_models.matrices.text import read_mtx
-from fe_models.matrices.unknowns import MatrixError, MatrixFile, Unknown, Values
+from fe_models.matrices.unknowns import MatrixError, MatrixFile, Unknown, Values, listed_names
 from sa_solver import checks
 
 AnyRead = TypeVar("AnyRead")
@@ -49,8 +49,6 @@ MOST_UNKNOWNS = 5_000_000
 # Tolerated asymmetry relative to the largest entries in the rows: rounding to single precision, in
 # which some programs write. The mean of both entries is used.
 SYMMETRIC = 1e-6
-# Largest number of names listed in a message.
-MOST_LISTED = 12
 
 
 @dataclass(frozen=True)
@@ -186,8 +184,7 @@ def _chosen(file: MatrixFile, part: str, name: str, own: bool) -> str | None:
 
 
 def _listed(names: Sequence[str]) -> str:
-    more = ", ..." if len(names) > MOST_LISTED else ""
-    return f"allowed: one of {', '.join(filter(None, names[:MOST_LISTED])) or 'none'}{more}"
+    return f"allowed: one of {listed_names([name for name in names if name]) or 'none'}"
 
 
 def _reading(path: Path, read: Callable[[], AnyRead]) -> AnyRead:

@@ -10,7 +10,7 @@ import scipy.linalg as sl
 
 from fe_models.joints.reduction import ReducedModel, free_frequencies, reduce_body
 from fe_models.matrices.structure import ExternalMatrices
-from fe_models.matrices.unknowns import MODAL, ROTATIONS, MatrixError, Unknown
+from fe_models.matrices.unknowns import MODAL, ROTATIONS, MatrixError, Unknown, listed_names
 from fe_models.solvers.linear_solver import FactorMemoryError, SolverError
 from sa_solver import checks
 from sa_solver.types import Array, Indices
@@ -28,8 +28,6 @@ NEGATIVE, SINGULAR = 1e-6, 1e-10
 MOST_RIGID, RIGID, ROUNDING = 6, 1e-3, 1e-8
 # Number of unknowns up to which all frequencies are computed.
 DENSE = 600
-# Largest number of names listed in a message.
-MOST_LISTED = 12
 
 
 def on_all(matrices: ExternalMatrices) -> ReducedModel:
@@ -400,9 +398,3 @@ def _lowest(matrix: Array, names: Sequence[str], part: str) -> tuple[str, Array]
 def _all_names(model: ReducedModel) -> list[str]:
     modes = range(1, len(model.stiffness) - len(model.kept) + 1)
     return [*(model.names or ()), *(Unknown(f"mode {mode}", MODAL).name for mode in modes)]
-
-
-def listed_names(names: Sequence[str]) -> str:
-    """Return names as text that fits into one line."""
-    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
-    return ", ".join(names[:MOST_LISTED]) + more

@@ -18,6 +18,8 @@ TRANSLATIONS, ROTATIONS, MODAL = ("x", "y", "z"), ("rx", "ry", "rz"), "modal"
 # Directions in the order of their numbers 1 to 6 in Abaqus and in Nastran.
 BY_NUMBER = (*TRANSLATIONS, *ROTATIONS)
 DIRECTIONS = (*BY_NUMBER, MODAL)
+# Largest number of names listed in a message.
+MOST_LISTED = 12
 
 Values: TypeAlias = Array | sp.csr_matrix
 
@@ -31,6 +33,12 @@ class MatrixError(InputError):
     def __init__(self, message: str, part: str = "") -> None:
         super().__init__(message)
         self.part = part
+
+
+def listed_names(names: Sequence[str]) -> str:
+    """Return names as text that fits into one line."""
+    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
+    return ", ".join(names[:MOST_LISTED]) + more
 
 
 class Unknown(NamedTuple):

@@ -22,6 +22,7 @@ from fe_models.meshes.structure_mesh import (
     Interface,
     MeshError,
     StructureMesh,
+    mesh_edges,
     numbered_as,
 )
 from fe_models.solvers.linear_solver import prepare
@@ -172,8 +173,7 @@ def _moved(body: Body, displacement: Array) -> Body:
     midsides = body.midsides
     if midsides is not None:
         # The displacement is linear between vertices, so edges keep their bulges.
-        ends = body.mesh.edges if mesh.dim() == 3 else body.mesh.facets
-        midsides = midsides + displacement[ends].mean(axis=0)
+        midsides = midsides + displacement[mesh_edges(body.mesh)].mean(axis=1)
     return replace(body, mesh=numbered_as(body.mesh, mesh), midsides=midsides)
 
 

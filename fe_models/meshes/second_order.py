@@ -10,7 +10,14 @@ import numpy as np
 from fe_models.elasticity.body import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.meshes.curved_face import Midsides, edges_of
-from fe_models.meshes.structure_mesh import Body, Interface, MeshError, StructureMesh, in_space
+from fe_models.meshes.structure_mesh import (
+    Body,
+    Interface,
+    MeshError,
+    StructureMesh,
+    in_space,
+    mesh_edges,
+)
 from sa_solver.types import Array, Indices
 
 # Distance from the middle of an edge, as a share of its length, up to which a midside node counts
@@ -48,7 +55,7 @@ def curvature(body: Body, imported: ImportedMesh) -> Curvature | None:
     """Return how curved a body's edges are, or None if the file has no midside nodes for it."""
     if body.name not in imported.midsides:
         return None
-    edges = _edges(body)
+    edges = mesh_edges(body.mesh)
     points, given, off = _places(body, edges, imported.midsides[body.name])
     least = MIDDLE * _lengths(body, edges)
     moved = np.zeros(0)
@@ -93,14 +100,14 @@ def set_nodes(elastic: ElasticBody, imported: ImportedMesh, group: str) -> Indic
         ends = _sides(surface[:, np.isin(surface, vertices).all(axis=0)].T)
     count = body.mesh.nvertices
     key = np.array([count, 1])
-    places = np.isin(np.sort(_edges(body), axis=1) @ key, np.sort(ends, axis=1) @ key)
+    places = np.isin(np.sort(mesh_edges(body.mesh), axis=1) @ key, np.sort(ends, axis=1) @ key)
     return np.append(vertices, count + np.flatnonzero(places))
 
 
 def _curved(body: Body, imported: ImportedMesh) -> Body:
     if body.name not in imported.midsides:
         return body
-    edges = _edges(body)
+    edges = mesh_edges(body.mesh)
     points, _, off = _places(body, edges, imported.midsides[body.name])
     if np.all(off <= MIDDLE * _lengths(body, edges)):
         return body
@@ -112,7 +119,7 @@ def _unfolded(body: Body) -> Body:
     from fe_models.meshes.isoparametric import folded
 
     mesh, corners = body.mesh, len(body.mesh.t)
-    middle = mesh.p.T[_edges(body)].mean(axis=1)
+    middle = mesh.p.T[mesh_edges(body.mesh)].mean(axis=1)
     on_surface = mesh.boundary_facets()
     if mesh.dim() == 3:
         on_surface = np.unique(mesh.f2e[:, on_surface])
@@ -130,12 +137,6 @@ def _unfolded(body: Body) -> Body:
             body = replace(body, midsides=midsides)
             wrong = folded(body)
     return body
-
-
-def _edges(body: Body) -> Indices:
-    """Return the vertices of the edges ``(m, 2)`` in the order of :attr:`Body.midsides`."""
-    mesh = body.mesh
-    return np.asarray((mesh.edges if mesh.dim() == 3 else mesh.facets).T)
 
 
 def _lengths(body: Body, edges: Indices) -> Array:
@@ -177,4 +178,4 @@ def _middles(body: Body, ends: Indices) -> Array:
     """Return the midside points ``(m, 3)`` of edges of a body between vertices ``(m, 2)``."""
     if body.midsides is None:
         return np.asarray(body.points[ends].mean(axis=1))
-    return Midsides(_edges(body), in_space(body.midsides)).at(ends)
+    return Midsides(mesh_edges(body.mesh), in_space(body.midsides)).at(ends)

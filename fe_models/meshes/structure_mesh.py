@@ -389,6 +389,11 @@ def named_mesh(points: Array, cells: Indices, boundaries: dict[str, Indices]) ->
     return numbered_as(mesh, mesh.with_boundaries(named))
 
 
+def mesh_edges(mesh: MeshTet | MeshTri) -> Indices:
+    """Return the vertices of the edges ``(m, 2)``, in the order of :attr:`Body.midsides`."""
+    return np.asarray((mesh.edges if mesh.dim() == 3 else mesh.facets).T)
+
+
 def numbered_as(mesh: MeshTet | MeshTri, same: MeshTet | MeshTri) -> MeshTet | MeshTri:
     """Return the ``same`` mesh with the cached connectivity of ``mesh``, whose elements are equal.
 

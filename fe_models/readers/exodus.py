@@ -19,7 +19,7 @@ import numpy as np
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.abaqus.cards import SourceLine
 from fe_models.readers.flattened import FlatFile
-from fe_models.readers.grouped import CORNERS, DIMENSION, FACE_SHAPES, GroupedMesh
+from fe_models.readers.grouped import CORNERS, DIMENSION, FACES, GroupedMesh
 from fe_models.readers.scene import Scene
 from fe_models.readers.scope import Element, Scope, extend
 from sa_solver.types import Indices
@@ -40,8 +40,8 @@ SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
     "hexahedron": (
         (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (0, 4, 7, 3), (0, 3, 2, 1), (4, 5, 6, 7),
     ),
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "triangle": FACES["triangle"],
+    "quad": FACES["quad"],
 }  # fmt: skip
 SHELL_SIDES = {"triangle": ((0, 1, 2),) * 2, "quad": ((0, 1, 2, 3),) * 2}
 SHELL = "a shell: mesh its volume with solid elements, or lay it on faces of solids to name these"
@@ -177,8 +177,7 @@ class _Read:
             extend(self.scope.node_sets.add(name, {}), {"": nodes})
         space = "coordz" in self._variables or len(self._variables.get("coord", ())) == 3
         sides_of = SIDES | SHELL_SIDES if space else SIDES
-        # Facets that are not elements of the file have negative numbers.
-        facet, elements = 0, len(self.scope.elements)
+        elements = len(self.scope.elements)
         for key, name in self._named("elem_ss", "ss", "side_set"):
             sides = self._array(key.replace("elem", "side")).tolist()
             taken = name in self.scope.element_sets
@@ -186,7 +185,7 @@ class _Read:
             for number, side in zip(self._array(key).tolist(), sides, strict=True):
                 if not 1 <= number <= elements:
                     raise self._wrong(f"side set {name} has elements that are not in the file")
-                element, facet = self.scope.elements[number], facet - 1
+                element = self.scope.elements[number]
                 faces = sides_of.get(element.shape, ())
                 if not 1 <= side <= len(faces):
                     raise self._wrong(
@@ -194,11 +193,7 @@ class _Read:
                         f"{len(faces)}"
                     )
                 nodes_of_face = tuple(element.nodes[corner] for corner in faces[side - 1])
-                self.scope.elements[facet] = Element(
-                    FACE_SHAPES[len(nodes_of_face)], nodes_of_face, (), self.scope.place,
-                    f"side set {name}", stands_alone=False,
-                )  # fmt: skip
-                extend(into, {"": [facet]})
+                self.scope.add_facet(into, nodes_of_face, self.scope.place, f"side set {name}")
 
     def _named(self, variable: str, names: str, kind: str) -> Iterator[tuple[str, str]]:
         """Yield the variables of all blocks or sets of a kind that are not empty, and names."""

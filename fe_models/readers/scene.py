@@ -98,12 +98,13 @@ class Scene:
         for load in self.loads:
             factor = of_loads.get(load.kind, 1.0)
             value = load.value
-            scaled = factor * value if isinstance(value, float) else _times(factor, value)
-            loads.append(replace(load, value=scaled, through=_times(length, load.through)))
+            scaled = factor * value if isinstance(value, float) else times(factor, value)
+            loads.append(replace(load, value=scaled, through=times(length, load.through)))
         return replace(self, materials=materials, loads=tuple(loads))
 
 
-def _times(factor: float, vector: Vector) -> Vector:
+def times(factor: float, vector: Vector) -> Vector:
+    """Return a vector times a factor."""
     x, y, z = vector
     return factor * x, factor * y, factor * z
 

@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.abaqus.cards import Card, SourceLine
+from fe_models.readers.grouped import FACE_SHAPES
 from sa_solver.types import Array
 
 # Numbers of nodes or elements, by the instance that they belong to; those of the scope itself are
@@ -83,7 +84,8 @@ class Scope:
     """Part, instance, assembly or flat file, with its nodes, elements, sets and surfaces.
 
     ``blocks`` are the element sets that are named only on ``*Element`` lines, as programs name
-    them. ``placing`` maps points ``(n, 3)`` to their positions in an instance.
+    them. ``facets`` counts the facets that are no elements of the file. ``placing`` maps points
+    ``(n, 3)`` to their positions in an instance.
     """
 
     name: str
@@ -94,6 +96,7 @@ class Scope:
     element_sets: Names[Members] = field(default_factory=Names)
     surfaces: Names[Card] = field(default_factory=Names)
     blocks: set[str] = field(default_factory=set)
+    facets: int = 0
     placing: Callable[[Array], Array] = lambda points: points
 
     def instance(self, name: str, place: SourceLine, placing: Callable[[Array], Array]) -> Scope:
@@ -108,6 +111,16 @@ class Scope:
             surfaces=deepcopy(self.surfaces),
             placing=placing,
         )
+
+    def add_facet(
+        self, members: Members, nodes: tuple[int, ...], place: SourceLine, kind: str
+    ) -> None:
+        """Add a facet that is no element of the file, and has a negative number, to ``members``."""
+        self.facets += 1
+        shape = FACE_SHAPES[len(nodes)]
+        facet = Element(shape, nodes, (), place, kind, stands_alone=False)
+        self.elements[-self.facets] = facet
+        extend(members, {"": [-self.facets]})
 
     def is_empty(self) -> bool:
         """Return whether nothing is defined in it."""

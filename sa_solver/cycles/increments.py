@@ -172,7 +172,8 @@ def of_nearest(values: Array, where: Mask, pitch: tuple[float, float]) -> Array:
     Among several cells at the same distance, the mean of those that searches from each of the four
     corners find first is taken, so that a symmetric field stays symmetric.
     """
-    from scipy.ndimage import distance_transform_edt  # slow to import, and rarely needed
+    # Imported here because it is rarely needed and slow to import.
+    from scipy.ndimage import distance_transform_edt
 
     found = np.zeros_like(values)
     for steps in product((1, -1), repeat=2):

@@ -35,8 +35,8 @@ import numpy as np
 
 from sa_solver import checks
 from sa_solver.cycles.tangential_loop import (
-    LoopFailure,
     LoopPath,
+    converged,
     stuck_stiffness,
     tractions_of_motion,
 )
@@ -204,7 +204,7 @@ def partial_slip_curve(
     height = checked_heights(height, contact.grid)
     moment = 0.0 if tilt == "free" else None
     pressed = contact.solve(height, P, moment, moment, tolerance=tolerance, start=start)
-    normal = _converged(pressed)
+    normal = converged(pressed)
     tangential, ratio = _stiffness(contact.half_space, normal)
     tilted = height - normal.tilt_x * contact.grid.y + normal.tilt_y * contact.grid.x
     depth = normal.approach - float(tilted.min())
@@ -213,7 +213,7 @@ def partial_slip_curve(
     force, gaps = [0.0], [np.zeros(contact.grid.shape)]
     for approach in normal.approach - shares[1:-1] * depth:
         before = reduced.start if reduced.pressure.any() else None
-        reduced = _converged(
+        reduced = converged(
             contact.solve(
                 height,
                 approach=approach,
@@ -276,9 +276,3 @@ def _stiffness(half_space: HalfSpace, normal: NormalState) -> tuple[float, float
     unit = np.ones((1, np.count_nonzero(pressed)))
     pressure = tractions_of_motion(lambda field: half_space.normal(field[0])[None], pressed, unit)
     return tangential, float(pressure.sum()) * half_space.grid.cell_area / tangential
-
-
-def _converged(state: NormalState) -> NormalState:
-    if not state.converged:
-        raise LoopFailure(state.message)
-    return state

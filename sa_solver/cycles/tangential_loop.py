@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from scipy.ndimage import binary_erosion
@@ -33,7 +33,10 @@ from sa_solver.contact_state import ContactLoad, ContactState
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.half_space.influence import Z
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalState
 from sa_solver.types import Array, Mask
+
+State = TypeVar("State", ContactState, NormalState)
 
 MOST_CYCLES = 4
 """Most cycles marched to find one that closes. For similar bodies the first one closes. Dissimilar
@@ -220,36 +223,10 @@ class TangentialLoop:
         return float(np.abs(self.cycle[1]).max()) / self.P
 
     @property
-    def friction_by_opening(self) -> float:
-        """Friction ΔT / 2P, with the distance ΔT of the branches in the middle of the stroke.
-
-        This is how µ is measured, because a stiffness parallel to the contact cancels. It is µ
-        where the contact slides in the middle of the stroke, and less otherwise.
-        """
-        (down, down_force), (up, up_force) = self._branches
-        middle = 0.5 * float(down[0] + down[-1])
-        above = np.interp(middle, up, up_force)
-        below = np.interp(middle, down[::-1], down_force[::-1])
-        return float(abs(above - below)) / (2.0 * self.P)
-
-    @property
     def residual_stiffness(self) -> float:
         """Mean slope of the last increments of both branches [N/mm]; 0 in sliding."""
-        return self._mean_slope(-2)
-
-    @property
-    def reversal_stiffness(self) -> float:
-        """Mean secant of the first increments after both reversals [N/mm].
-
-        This is what a test would measure; it tends to ``stiffness`` as the increments shrink.
-        """
-        return self._mean_slope(0)
-
-    def _mean_slope(self, increment: int) -> float:
-        """Return the mean slope of both branches in the increment that starts at this point."""
         slopes = [
-            (force[increment + 1] - force[increment])
-            / (displacement[increment + 1] - displacement[increment])
+            (force[-1] - force[-2]) / (displacement[-1] - displacement[-2])
             for displacement, force in self._branches
         ]
         return float(np.mean(slopes))
@@ -408,7 +385,7 @@ def _press(contact: FrictionalContact, height: Array, path: LoopPath) -> Contact
     state = contact.unloaded_state(height)
     for step in range(1, steps + 1):
         values = np.array([path.P, 0.0, 0.0, Mx, My, 0.0]) * (step / steps)
-        state = _converged(contact.advance(state, height, ContactLoad(values, motion)))
+        state = converged(contact.advance(state, height, ContactLoad(values, motion)))
     return state
 
 
@@ -422,12 +399,12 @@ def _states(
     state = pressed
     yield state
     for share in np.linspace(0.0, 1.0, n + 1)[1:]:
-        state = _converged(contact.advance(state, height, load.at(share)))
+        state = converged(contact.advance(state, height, load.at(share)))
         yield state
     for _ in range(MOST_CYCLES):
         cycle = [state]
         for share in (*back[1:], *-back[1:]):
-            state = _converged(contact.advance(state, height, load.at(share)))
+            state = converged(contact.advance(state, height, load.at(share)))
             cycle.append(state)
             yield state
         if _closure(cycle, path) <= CLOSED:
@@ -489,7 +466,8 @@ def _slipping_share(state: ContactState) -> float:
     return float(pressure[~state.sticking].sum() / pressure.sum())
 
 
-def _converged(state: ContactState) -> ContactState:
+def converged(state: State) -> State:
+    """Return a state, or raise LoopFailure if it has not converged."""
     if not state.converged:
         raise LoopFailure(state.message)
     return state

@@ -6,7 +6,7 @@ Both only save time: the solution is verified by a convolution on the whole grid
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from sa_solver.dissimilar.newton import (
     newton_on_cones,
 )
 from sa_solver.dissimilar.problem import CoupledProblem
-from sa_solver.half_space.active_box import Box
+from sa_solver.half_space.active_box import Box, OnBoxes
 from sa_solver.half_space.influence import Z
 from sa_solver.half_space.nested_grids import GridTransfer, coarsened
 from sa_solver.half_space.operator import HalfSpace
@@ -32,9 +32,6 @@ COARSE_TOLERANCE = 3e-3
 COARSE_ITERATIONS = 40
 """Most directions on coarser grids: a poor initial guess is not worth more."""
 
-BOXES = 4
-"""Number of boxes whose transforms are cached."""
-
 
 class CoupledLevel:
     """Solver on one grid, with cached transforms and coarser grids.
@@ -46,7 +43,7 @@ class CoupledLevel:
         """Prepare the solver for ``half_space``."""
         self.half_space = half_space
         self.transformed = 0.0
-        self._boxed = lru_cache(BOXES)(self._plan)
+        self._operators = OnBoxes(half_space, CoupledOperator)
 
     def begin(self, problem: CoupledProblem) -> tuple[Array, Mask] | None:
         """Return an admissible, balanced traction ``(3, nx, ny)`` and the cells that slip.
@@ -82,7 +79,7 @@ class CoupledLevel:
         pressed = traction[Z] > 0.0
         box = Box.around(pressed if missed is None else pressed | missed)
         while True:
-            operator = self._operator(box)
+            operator = self._operators.on(box)
             before = operator.half_space.count
             found = newton_on_cones(
                 problem.cropped(box.window, operator.half_space),
@@ -107,7 +104,7 @@ class CoupledLevel:
     ) -> tuple[Array, Mask] | None:
         if not traction[Z].any():
             return None
-        within = balanced(problem, self._whole, traction, slipping)
+        within = balanced(problem, self._operators.whole, traction, slipping)
         return None if within is None else (within, slipping)
 
     def _pressed(self, problem: CoupledProblem) -> Array:
@@ -163,18 +160,6 @@ class CoupledLevel:
     @cached_property
     def _normal(self) -> NormalContact:
         return NormalContact(self.half_space)
-
-    # -- boxes --------------------------------------------------------------------------------
-    def _operator(self, box: Box) -> CoupledOperator:
-        return self._whole if box.size == box.shape else self._boxed(box.size)
-
-    @cached_property
-    def _whole(self) -> CoupledOperator:
-        return CoupledOperator(self.half_space)
-
-    def _plan(self, size: tuple[int, int]) -> CoupledOperator:
-        grid = replace(self.half_space.grid, shape=size)
-        return CoupledOperator(self.half_space.on(grid))
 
     def _count(self, half_space: HalfSpace, convolutions: float) -> None:
         self.transformed += convolutions * float(np.prod(half_space.padded))

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.rigid_modes import Window
 from sa_solver.types import Array, Mask
+
+T = TypeVar("T")
 
 MARGIN = 0.06
 """Width of the margin around the pressed cells, relative to their extent. The margin must cover the
@@ -24,6 +30,9 @@ LARGEST_SHARE = 0.7
 SIZES = (8, 10, 12, 15)
 """Sides of a box are one of these times a power of two: transforms of these lengths are fast, and
 there are few enough of them to be stored."""
+
+BOXES = 4
+"""Number of boxes whose operators are stored: a wear run needs two or three."""
 
 
 @dataclass(frozen=True)
@@ -93,3 +102,31 @@ def _fast(count: int) -> int:
     """Return the least of :data:`SIZES` times a power of two that is not below ``count``."""
     doublings = max(0, int(np.ceil(np.log2(count / SIZES[-1]))))
     return next(size << doublings for size in SIZES if size << doublings >= count)
+
+
+class OnBoxes(Generic[T]):
+    """Operators on a half-space and on boxes of its cells, each made once.
+
+    Parameters
+    ----------
+    half_space
+        The half-space.
+    make
+        Function that returns the operator on a half-space.
+    """
+
+    def __init__(self, half_space: HalfSpace, make: Callable[[HalfSpace], T]) -> None:
+        self._half_space, self._make = half_space, make
+        self._of_size = lru_cache(BOXES)(self._made)
+
+    @cached_property
+    def whole(self) -> T:
+        """Operator on all cells."""
+        return self._make(self._half_space)
+
+    def on(self, box: Box) -> T:
+        """Return the operator on a box."""
+        return self.whole if box.size == box.shape else self._of_size(box.size)
+
+    def _made(self, size: tuple[int, int]) -> T:
+        return self._make(self._half_space.on(replace(self._half_space.grid, shape=size)))

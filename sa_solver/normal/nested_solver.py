@@ -6,11 +6,11 @@ Both only save time: the solution is verified by a convolution on the whole grid
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
-from sa_solver.half_space.active_box import Box
+from sa_solver.half_space.active_box import Box, OnBoxes
 from sa_solver.half_space.nested_grids import GridTransfer, coarsened
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.half_space.preconditioner import NormalPreconditioner
@@ -29,16 +29,13 @@ ENOUGH = 3.0
 """Load of an initial guess over the least load that can carry the moments, where the approach is
 imposed."""
 
-BOXES = 4
-"""Number of boxes whose transforms are cached: a wear run needs two or three."""
-
 
 class NestedSolver:
     """Solver of normal contact problems on one grid, with cached transforms and coarser grids."""
 
     def __init__(self, half_space: HalfSpace) -> None:
         self.half_space = half_space
-        self._boxed = lru_cache(BOXES)(self._plan)
+        self._preconditioners = OnBoxes(half_space, NormalPreconditioner)
 
     def cold_start(self, problem: NormalProblem) -> Array | None:
         """Return a balanced pressure >= 0 as initial guess, from coarser grids if there are any.
@@ -90,7 +87,7 @@ class NestedSolver:
         The last box is returned as well.
         """
         while True:
-            preconditioner = self._preconditioner(box)
+            preconditioner = self._preconditioners.on(box)
             inner = problem.cropped(box.window, preconditioner.half_space)
             preconditioner.include(inner.compliance)
             inside = np.ascontiguousarray(pressure[box.window])
@@ -147,19 +144,6 @@ class NestedSolver:
             half_space=self.half_space,
             compliance=None if compliance is None else transfer.averaged(compliance),
         )
-
-    # -- boxes --------------------------------------------------------------------------------
-    def _preconditioner(self, box: Box) -> NormalPreconditioner:
-        """Return the preconditioner of the half-space on a box."""
-        return self._whole if box.size == box.shape else self._boxed(box.size)
-
-    @cached_property
-    def _whole(self) -> NormalPreconditioner:
-        return NormalPreconditioner(self.half_space)
-
-    def _plan(self, size: tuple[int, int]) -> NormalPreconditioner:
-        grid = replace(self.half_space.grid, shape=size)
-        return NormalPreconditioner(self.half_space.on(grid))
 
 
 def _uniform_pressure(problem: NormalProblem) -> Array | None:

@@ -84,7 +84,8 @@ def cylinder_stress(
     inner, product = a**2 - x**2 + z**2, 2.0 * x * z
     modulus = np.hypot(inner, product)
     m, n = np.sqrt(0.5 * (modulus + inner)), np.sign(x) * np.sqrt(0.5 * (modulus - inner))
-    square = np.where(modulus > 0.0, modulus, 1.0)  # m² + n², which is 0 at the edges
+    # The modulus is m² + n², which is 0 at the edges.
+    square = np.where(modulus > 0.0, modulus, 1.0)
     xx = -(p0 / a) * (m * (1.0 + (z**2 + n**2) / square) - 2.0 * z)
     zz = -(p0 / a) * m * (1.0 - (z**2 + n**2) / square)
     zx = -(p0 / a) * n * (m**2 - z**2) / square

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
+from fe_models.dynamics.curves.forced_response import along_force, along_frequency
+from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution

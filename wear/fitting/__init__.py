@@ -74,17 +74,4 @@ __all__ = [
     "volume_problem",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "common": ("Common", "common_over"),
-        "diagnosis": ("diagnose",),
-        "estimates": ("Estimate",),
-        "evolutions": ("EvolutionData", "evolution_problem"),
-        "least_squares": ("Fit", "fit"),
-        "loops": ("LoopData", "loop_data", "loop_problem"),
-        "problem": ("FitError", "FitProblem", "Series", "FreeParameter"),
-        "scars": ("ComputedScars", "ScarData", "scar_problem"),
-        "volumes": ("VolumeData", "VolumeLaw", "volume_problem"),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)

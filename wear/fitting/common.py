@@ -16,7 +16,7 @@ from scipy.special import chdtrc, fdtrc
 
 from sa_solver import checks
 from sa_solver.types import Array, Indices
-from wear.fitting.estimates import RANK
+from wear.fitting.estimates import RANK, inverse_of
 from wear.fitting.least_squares import Fit, is_exact
 from wear.fitting.problem import FitError
 
@@ -150,15 +150,9 @@ class _Linear:
     """
 
     def __init__(self, columns: Array, residuals: Array) -> None:
-        lengths = np.linalg.norm(columns, axis=0)
-        lengths = np.where(lengths > 0.0, lengths, 1.0)
-        left, values, right = np.linalg.svd(columns / lengths, full_matrices=False)
-        significant = values > RANK * values[0]
-        self.rank = int(significant.sum())
-        scaled = right[significant].T / values[significant]
-        self.inverse = scaled @ left[:, significant].T / lengths[:, None]
+        self.inverse, undetermined = inverse_of(columns)
+        # The determined shares of all coefficients add up to the number of determined directions.
+        self.rank = round(float(np.sum(1.0 - undetermined)))
         self.found = self.inverse @ residuals
         self.squares = float(np.sum((residuals - columns @ self.found) ** 2))
-        # With fewer data than columns, the reduced form does not list all undetermined directions.
-        determined = np.sum(right[significant] ** 2, axis=0)
-        self.undetermined = 1.0 - determined > RANK
+        self.undetermined = undetermined > RANK

@@ -90,28 +90,4 @@ __all__ = [
     "steady_stroke",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "ageing": ("long_test", "steady_stroke"),
-        "bouc_wen": ("BoucWen",),
-        "elastic": ("ElasticStop", "PolynomialSpring"),
-        "evolution": (
-            "ArrheniusEvolution",
-            "ExponentialEvolution",
-            "JointEvolution",
-            "LinearEvolution",
-            "LogarithmicEvolution",
-            "TabulatedEvolution",
-        ),
-        "friction_contact": ("FrictionContact",),
-        "iwan": ("FourParameterIwan", "UniformIwan"),
-        "jenkins": ("Jenkins",),
-        "law": ("JointLaw", "march_joints"),
-        "measured.measured_loops": ("measure_loops",),
-        "mixed": ("JointGroup", "MixedLaw"),
-        "periodic.parallel": ("ParallelSliders",),
-        "parameters": ("JointError",),
-        "periodic.march": ("PeriodicMarch",),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)

@@ -203,7 +203,8 @@ class TabulatedEvolution:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        table = EnergyTable(self.energies, self.values)  # refuses what is no table
+        # This raises an error for anything that is not a table.
+        table = EnergyTable(self.energies, self.values)
         checks.settle(self, energies=table.energy, values=table.factor)
 
     def __call__(self, energy: Array | float) -> Array:

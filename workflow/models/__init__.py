@@ -49,21 +49,4 @@ __all__ = [
     "WearModel",
 ]
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "assembly": ("LegPath", "MeshAssembly", "TightenedBolt"),
-        "contact": ("Contact", "Wear"),
-        "dovetail": ("DovetailJoint", "DovetailMesh"),
-        "gaps": ("AddedGap",),
-        "loads": ("ContactFace", "LoadSource", "UncoupledSource"),
-        "loops": ("TangentialLoops",),
-        "rig.motion": ("MotionModel",),
-        "rig.rig_model": ("RigModel",),
-        "structure": ("StructureLoads",),
-        "structure_model": ("LoadCycle", "Nonlinearity", "StructureModel"),
-        "vibration.model": ("VibrationModel",),
-        "vibration.sweep": ("FrequencySweep",),
-        "wear": ("WearModel",),
-    },
-)
+__getattr__, __dir__ = lazy_names(__name__)

@@ -205,7 +205,8 @@ class _Segment(Generic[L]):
             if function(0.0) * function(1.0) > 0.0:
                 return None
             share = float(brentq(function, 0.0, 1.0, xtol=LOCATION_TOLERANCE))
-            function(share)  # so that its value there is cached
+            # The value at the root is cached for later.
+            function(share)
             return share
         except _CurveLost:
             return None

@@ -179,9 +179,7 @@ def _projected(
 
 def _oriented(point: CurvePoint, orientation: int) -> CurvePoint:
     """Return a point with its tangent in the sense that has this orientation; unchanged if 0."""
-    if point.orientation * orientation >= 0:
-        return point
-    return replace(point, tangent=-point.tangent, orientation=orientation)
+    return point if point.orientation * orientation >= 0 else point.turned()
 
 
 def _find_and_describe(

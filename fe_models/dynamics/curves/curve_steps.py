@@ -145,6 +145,10 @@ class CurvePoint:
         coordinates[:-1], coordinates[-1] = self.unknowns, self.parameter
         return coordinates
 
+    def turned(self) -> CurvePoint:
+        """Return the same point with the opposite direction of the curve."""
+        return replace(self, tangent=-self.tangent, orientation=-self.orientation)
+
 
 class Scaling:
     """Scaling of steps: relative to the norm of the unknowns less ``origin``, and relative to λ.

@@ -1,4 +1,4 @@
-"""Curves of periodic motions that have been followed, and points between two of their points.
+"""Curves of periodic motions, and points between two of their points.
 
 Such a point is found from the chord between the two: Newton's method leads to the curve in the
 plane across the chord.
@@ -15,7 +15,6 @@ import numpy as np
 
 from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, Scaling, correct
 from fe_models.dynamics.curves.newton import Equations, L
-from fe_models.dynamics.curves.phase_resonance import PhaseBalance, PhaseResonance
 from fe_models.dynamics.curves.sizes import norm
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
@@ -42,6 +41,8 @@ class FollowedCurve(Generic[L]):
         Functions that return unknowns and parameter of a motion.
     motion_of
         Function that returns the motion for unknowns, a parameter and the equations there.
+    refined
+        Function that returns the curve of the same problem at another resolution.
     """
 
     problem: HarmonicBalance
@@ -50,6 +51,7 @@ class FollowedCurve(Generic[L]):
     unknowns_of: Callable[[HarmonicSolution], Array]
     parameter_of: Callable[[HarmonicSolution], float]
     motion_of: Callable[[Array, float, L], HarmonicSolution]
+    refined: Callable[[HarmonicBalance], FollowedCurve[L]]
 
     def coordinates_of(self, motion: HarmonicSolution) -> Array:
         """Return unknowns and parameter of a motion ``(n + 1,)``."""
@@ -65,6 +67,7 @@ def curve_by_frequency(problem: HarmonicBalance, force: float) -> FollowedCurve[
         problem.guess,
         lambda motion: motion.frequency,
         lambda unknowns, frequency, at: problem.describe(unknowns, at, frequency, force),
+        lambda finer: curve_by_frequency(finer, force),
     )
 
 
@@ -77,25 +80,7 @@ def curve_by_force(problem: HarmonicBalance, frequency: float) -> FollowedCurve[
         problem.guess,
         lambda motion: motion.force,
         lambda unknowns, force, at: problem.describe(unknowns, at, frequency, force),
-    )
-
-
-def curve_by_phase(problem: HarmonicBalance, near: HarmonicSolution) -> FollowedCurve[PhaseBalance]:
-    """Return the curve of phase resonances, with the force as parameter.
-
-    The motion ``near`` the curve sets the reference of the unknown frequency.
-    """
-    equations = PhaseResonance.near(problem, near)
-
-    def unknowns_of(motion: HarmonicSolution) -> Array:
-        return np.append(problem.guess(motion), equations.unknown_of(motion.frequency))
-
-    def motion_of(unknowns: Array, force: float, at: PhaseBalance) -> HarmonicSolution:
-        return problem.describe(unknowns[:-1], at.balance, at.frequency, force)
-
-    origin = np.append(problem.guess(None), 0.0)
-    return FollowedCurve(
-        problem, equations, origin, unknowns_of, lambda motion: motion.force, motion_of
+        lambda finer: curve_by_force(finer, frequency),
     )
 
 

@@ -2,70 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.dynamics.curves.continuation import Refinement, SolutionCurve, follow
-from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, first_point
-from fe_models.dynamics.curves.newton import Equations, solve
-from fe_models.dynamics.periodic.harmonic_balance import (
-    SAMPLES_PER_PERIOD,
-    Balance,
-    HarmonicBalance,
+from fe_models.dynamics.curves.continuation import SolutionCurve
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
+from fe_models.dynamics.curves.followed_curve import (
+    FollowedCurve,
+    curve_by_force,
+    curve_by_frequency,
 )
-from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution, ResolutionError
-from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
-from fe_models.dynamics.periodic.resolution_error import extended_problem, resolution_error
+from fe_models.dynamics.curves.motion_recorder import Accuracy, MotionRecorder, Search
+from fe_models.dynamics.curves.newton import NewtonSolution, solve
+from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError
 from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
-# Shares of the tolerance that neglected harmonics and samples may contribute to the error.
-HARMONICS_SHARE, SAMPLES_SHARE = 0.3, 0.5
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """Accuracy of periodic motions, to which their resolution adapts.
-
-    Parameters
-    ----------
-    tolerance
-        Tolerance of the errors of vibration and energy.
-    highest
-        Highest harmonic that may be added.
-    most_samples
-        Largest number of samples of a period. If harmonics and samples do not suffice, the
-        remaining error is in the solutions.
-
-    Examples
-    --------
-    The force of a slider has a third harmonic. It is added for an accuracy of 0.1 %.
-
-    >>> import numpy as np
-    >>> from fe_models.dynamics import *
-    >>> from wear.joints import Jenkins, PeriodicMarch
-    >>> rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]], damping_ratio=0.02)
-    >>> load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
-    >>> law = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
-    >>> problem = HarmonicBalance(rig, PeriodicMarch(law), load, Resolution((1,), 64))
-    >>> branch = along_frequency(problem, 10.0, (180.0, 190.0), accuracy=Accuracy(1e-3))
-    >>> print(3 in branch.problem.resolution.harmonics, branch.solutions[-1].error.largest < 1e-3)
-    True True
-    """
-
-    tolerance: float
-    highest: int = 63
-    most_samples: int = 4096
-
-    def __post_init__(self) -> None:
-        checks.numbers(self, "tolerance", above=0.0, error=HarmonicBalanceError)
-        for name in ("highest", "most_samples"):
-            if checks.whole(name, getattr(self, name), HarmonicBalanceError) < 1:
-                raise HarmonicBalanceError(f"{name} = {getattr(self, name)}: give 1 or more")
+Curve = FollowedCurve[Balance]
 
 
 @dataclass(frozen=True)
@@ -160,8 +117,16 @@ def along_frequency(
     >>> print(f"{branch.first_amplitudes(0).max():.3f} mm of {1.0 / (2.0 * 0.02 * 1e3):.3f}")
     0.025 mm of 0.025
     """
-    along = Along("frequency", force)
-    return _branch(problem, along, span, start, upward, control, accuracy, steps)
+    checks.number("force", force, error=HarmonicBalanceError)
+    _check(span, 0.0)
+
+    def find(
+        curve: Curve, unknowns: Array, frequency: float, control: ContinuationControl
+    ) -> NewtonSolution[Balance]:
+        return curve.problem.find(frequency, force, unknowns, control)
+
+    curve = curve_by_frequency(problem, force)
+    return _branch(curve, find, span, start, upward, control, accuracy, steps)
 
 
 def along_force(
@@ -204,111 +169,33 @@ def along_force(
     >>> print(share.round(2))
     [1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1.]
     """
-    along = Along("force", frequency)
-    return _branch(problem, along, span, start, upward, control, accuracy, steps)
+    checks.number("frequency", frequency, error=HarmonicBalanceError)
+    _check(span, -np.inf)
+
+    def find(
+        curve: Curve, unknowns: Array, force: float, control: ContinuationControl
+    ) -> NewtonSolution[Balance]:
+        found = curve.problem.find(frequency, force, unknowns, control)
+        # The derivatives must be those with respect to the force.
+        return solve(curve.equations, found.unknowns, force) if found.converged else found
+
+    curve = curve_by_force(problem, frequency)
+    return _branch(curve, find, span, start, upward, control, accuracy, steps)
 
 
-@dataclass(frozen=True)
-class Along:
-    """Quantity that varies along a branch, and the fixed value of the ``other`` one."""
-
-    varies: Literal["frequency", "force"]
-    other: float
-
-    def equations(self, problem: HarmonicBalance) -> Equations[Balance]:
-        if self.varies == "frequency":
-            return problem.by_frequency(self.other)
-        return problem.by_force(self.other)
-
-    def frequency_and_force(self, parameter: float) -> tuple[float, float]:
-        return (parameter, self.other) if self.varies == "frequency" else (self.other, parameter)
-
-
-class BranchRecorder:
-    """Recorder of the motions of a branch, which requests refined equations where needed."""
-
-    def __init__(self, problem: HarmonicBalance, along: Along, accuracy: Accuracy | None) -> None:
-        self.problem, self._along, self._accuracy = problem, along, accuracy
-        self.solutions: list[HarmonicSolution] = []
-
-    def describe(self, point: CurvePoint, at: Balance) -> HarmonicSolution:
-        """Return the motion at a point, with its error if an accuracy is given."""
-        frequency, force = self._along.frequency_and_force(point.parameter)
-        solution = self.problem.describe(point.unknowns, at, frequency, force, point.iterations)
-        if self._accuracy is None:
-            return solution
-        return replace(solution, error=resolution_error(self.problem, solution))
-
-    def take(self, description: HarmonicSolution) -> Refinement[Balance] | None:
-        """Store a motion, or request refined equations if it is not accurate."""
-        finer = finer_for(self.problem, description, self._accuracy)
-        if finer is not None:
-            return self._refine(finer)
-        if description.resolution is not self.problem.resolution:
-            # A stored motion has a resolution object of its own: let all motions share one.
-            description = replace(description, resolution=self.problem.resolution)
-        self.solutions.append(description)
-        return None
-
-    def _refine(self, finer: Resolution) -> Refinement[Balance]:
-        coarse, self.problem = self.problem.resolution, self.problem.with_resolution(finer)
-        size = coarse.size, self.problem.joints.directions
-
-        def lift(unknowns: Array) -> Array:
-            return finer.adopt(unknowns.reshape(-1, *size), coarse).ravel()
-
-        return Refinement(self._along.equations(self.problem), lift)
-
-
-def finer_for(
-    problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
-) -> Resolution | None:
-    """Return the resolution that a motion needs, or None if that of the problem suffices."""
-    if accuracy is None or motion.error is None:
-        return None
-    # When the error was estimated in an earlier run, the richer problem grew; it must grow here
-    # too.
-    extended_problem(problem, motion)
-    return finer_resolution(problem.resolution, motion.error, accuracy)
-
-
-def finer_resolution(
-    present: Resolution, error: ResolutionError, accuracy: Accuracy
-) -> Resolution | None:
-    """Return the resolution that an error demands, or None if the present one is kept.
-
-    The harmonics that cause most of the error are added. The present resolution is kept if it
-    suffices or is the finest allowed.
-
-    Parameters
-    ----------
-    present
-        Present resolution.
-    error
-        Error of a motion.
-    accuracy
-        Accuracy demanded.
-    """
-    tolerance, harmonics, samples = accuracy.tolerance, present.harmonics, present.samples
-    if error.largest > tolerance:
-        parts = error.harmonics[: accuracy.highest + 1]
-        order = np.argsort(parts)
-        # Error that remains if the harmonics up to this one, in ascending order of contribution,
-        # are neglected.
-        remaining = np.sqrt(np.cumsum(parts[order] ** 2))
-        added = order[remaining > HARMONICS_SHARE * tolerance]
-        harmonics = tuple(sorted({*harmonics, *added.tolist()}))
-        if error.sampling > SAMPLES_SHARE * tolerance:
-            samples *= 2
-    while samples < SAMPLES_PER_PERIOD * harmonics[-1]:
-        samples *= 2
-    finer = Resolution(harmonics, min(samples, max(accuracy.most_samples, present.samples)))
-    return None if finer == present else finer
+def _check(span: tuple[float, float], lower_bound: float) -> None:
+    """Raise HarmonicBalanceError if a span does not ascend, or is not above its lower bound."""
+    checks.array("ends of the span", span, (2,), error=HarmonicBalanceError, finite=False)
+    if not lower_bound < span[0] < span[1] < np.inf:
+        raise HarmonicBalanceError(
+            f"the span from {span[0]:g} to {span[1]:g} is not possible: give its lower end first, "
+            "and finite ends, above 0 if they are frequencies"
+        )
 
 
 def _branch(
-    problem: HarmonicBalance,
-    along: Along,
+    curve: Curve,
+    find: Search[Balance],
     span: tuple[float, float],
     start: HarmonicSolution | ResponseBranch | None,
     upward: bool,
@@ -316,72 +203,18 @@ def _branch(
     accuracy: Accuracy | None,
     steps: Steps,
 ) -> ResponseBranch:
-    """Return the branch along frequency or force; see :func:`along_frequency`."""
-    checks.number("force or frequency", along.other, error=HarmonicBalanceError)
-    checks.array("ends of the span", span, (2,), error=HarmonicBalanceError, finite=False)
-    lower_bound = 0.0 if along.varies == "frequency" else -np.inf
-    if not lower_bound < span[0] < span[1] < np.inf:
-        raise HarmonicBalanceError(
-            f"the span from {span[0]:g} to {span[1]:g} is not possible: give its lower end first, "
-            "and finite ends, above 0 if they are frequencies"
-        )
+    """Return the branch along a curve; see :func:`along_frequency`."""
     control = control or ContinuationControl()
-    end: float | None = span[1] if upward else span[0]
     if isinstance(start, ResponseBranch):
-        record, point = BranchRecorder(start.problem, along, accuracy), start.curve.points[-1]
+        recorder = MotionRecorder(curve.refined(start.problem), accuracy)
         # The last point knows in which direction the branch continues.
-        end = None
+        followed = recorder.follow(start.curve.points[-1], span, control, steps)
     else:
-        record = BranchRecorder(problem, along, accuracy)
-        first = _first(record, along, span[0 if upward else 1], start, upward, control, steps)
+        recorder = MotionRecorder(curve, accuracy)
+        begin, end = span if upward else span[::-1]
+        unknowns = curve.problem.guess(start)
+        first = recorder.find_first(unknowns, begin, upward, control, steps, find)
         if isinstance(first, str):
-            return ResponseBranch((), SolutionCurve((), first), problem)
-        point = first
-    # Steps are relative to the vibration, since the displacement under the constant load may be far
-    # larger.
-    rest = record.problem.guess(None)
-    curve = follow(
-        along.equations(record.problem),
-        point,
-        span,
-        control,
-        record,
-        rest,
-        record.problem.rounding,
-        end=end,
-        steps=steps,
-    )
-    return ResponseBranch(tuple(record.solutions), curve, record.problem)
-
-
-def _first(
-    record: BranchRecorder,
-    along: Along,
-    parameter: float,
-    start: HarmonicSolution | None,
-    upward: bool,
-    control: ContinuationControl,
-    steps: Steps,
-) -> CurvePoint | str:
-    """Return the first point of a branch, which is recorded, or the reason why there is none."""
-    frequency, force = along.frequency_and_force(parameter)
-
-    def found(unknowns: Array) -> tuple[CurvePoint, HarmonicSolution] | str:
-        solution = record.problem.find(frequency, force, unknowns, control)
-        if not solution.converged:
-            return solution.message
-        if along.varies == "force":
-            solution = solve(along.equations(record.problem), solution.unknowns, parameter)
-        point = first_point(solution, parameter, upward, control.first)
-        return point, record.describe(point, solution.at)
-
-    unknowns = record.problem.guess(start)
-    while True:
-        first = steps("first point of a curve", partial(found, unknowns))
-        if isinstance(first, str):
-            return first
-        point, motion = first
-        finer = record.take(motion)
-        if finer is None:
-            return point
-        unknowns = finer.lift(point.unknowns)
+            return ResponseBranch((), SolutionCurve((), first), curve.problem)
+        followed = recorder.follow(first, span, control, steps, end)
+    return ResponseBranch(tuple(recorder.solutions), followed, recorder.curve.problem)

@@ -15,10 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from fe_models.dynamics.curves.continuation import Refinement, follow
-from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, first_point
+from fe_models.dynamics.curves.continuation import Refinement
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import Chord, curve_by_frequency
-from fe_models.dynamics.curves.forced_response import Accuracy, Along, BranchRecorder, Motions
+from fe_models.dynamics.curves.forced_response import Motions
+from fe_models.dynamics.curves.motion_recorder import Accuracy, MotionRecorder
 from fe_models.dynamics.curves.newton import NewtonControl, solve
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
@@ -179,23 +180,13 @@ class _CurveClosed(FretscaleError):
     """Error raised when the curve has returned to its first point."""
 
 
-class _ClosedCurveRecorder(BranchRecorder):
+class _ClosedCurveRecorder(MotionRecorder[Balance]):
     """Recorder of a branch that stops when the curve has returned to its first point."""
-
-    def __init__(
-        self,
-        problem: HarmonicBalance,
-        along: Along,
-        accuracy: Accuracy | None,
-        first: HarmonicSolution,
-    ) -> None:
-        super().__init__(problem, along, accuracy)
-        self._first = first
 
     def take(self, description: HarmonicSolution) -> Refinement[Balance] | None:
         finer = super().take(description)
-        may_close = finer is None and len(self.solutions) > MIN_POINTS
-        if may_close and _contains(self.problem, self.solutions[-2:], self._first):
+        may_close = finer is None and len(self.solutions) > MIN_POINTS + 1
+        if may_close and _contains(self.curve.problem, self.solutions[-2:], self.solutions[0]):
             raise _CurveClosed
         return finer
 
@@ -209,34 +200,26 @@ def _follow_both_ways(
     steps: Steps,
 ) -> FurtherBranch:
     """Follow the curve through a motion in both directions."""
-    along = Along("frequency", motion.force)
+    curve = curve_by_frequency(problem, motion.force)
     halves, messages = [], []
     for upward in (True, False):
-        record = _ClosedCurveRecorder(problem, along, accuracy, motion)
-        solution = solve(
-            problem.by_frequency(motion.force), problem.guess(motion), motion.frequency
-        )
-        point: CurvePoint = first_point(solution, motion.frequency, upward, control.first)
+        recorder = _ClosedCurveRecorder(curve, accuracy)
+        unknowns = curve.unknowns_of(motion)
+        first = recorder.find_first(unknowns, motion.frequency, upward, control, steps)
+        if isinstance(first, str):
+            halves.append([motion])
+            messages.append(first)
+            continue
         try:
-            curve = follow(
-                along.equations(problem),
-                point,
-                span,
-                control,
-                record,
-                problem.guess(None),
-                problem.rounding,
-                steps=steps,
-            )
+            messages.append(recorder.follow(first, span, control, steps).message)
         except _CurveClosed:
-            motions = (motion, *record.solutions)
-            return FurtherBranch(motions, True, False, "", record.problem)
-        halves.append(record.solutions)
-        messages.append(curve.message)
-        problem = record.problem
-    motions = (*reversed(halves[1]), motion, *halves[0])
+            motions = tuple(recorder.solutions)
+            return FurtherBranch(motions, True, False, "", recorder.curve.problem)
+        halves.append(recorder.solutions)
+        curve = recorder.curve
+    motions = (*reversed(halves[1]), *halves[0][1:])
     message = "; ".join(message for message in messages if message)
-    return FurtherBranch(motions, False, False, message, problem)
+    return FurtherBranch(motions, False, False, message, curve.problem)
 
 
 def _contains(
@@ -247,7 +230,8 @@ def _contains(
     at = curve.coordinates_of(motion)
     points = [curve.coordinates_of(each) for each in motions]
     # Relative differences of the unknowns and of the frequency have equal weight.
-    scale = np.full(len(at), 1.0 / (problem.vibration(motion.coefficients) or 1.0))
+    size = problem.vibration(at[:-1]) or 1.0
+    scale = np.full(len(at), 1.0 / size)
     scale[-1] = 1.0 / motion.frequency
     for start, end in pairwise(points):
         chord, difference = scale * (end - start), scale * (at - start)
@@ -255,20 +239,12 @@ def _contains(
         offset = np.linalg.norm(difference - share * chord)
         if 0.0 <= share <= 1.0 and offset <= CLOSURE_SHARE * np.linalg.norm(chord):
             located = Chord(curve, start, end, control).at(share)
-            if (
-                located is None
-                or _distance(problem, located.point.coordinates, at, motion) <= SAME_MOTION
-            ):
+            if located is None or _distance(located.point.coordinates, at, size) <= SAME_MOTION:
                 return True
-    return any(
-        _distance(problem, end, at, motion) <= SAME_MOTION for end in (points[0], points[-1])
-    )
+    return any(_distance(end, at, size) <= SAME_MOTION for end in (points[0], points[-1]))
 
 
-def _distance(
-    problem: HarmonicBalance, first: Array, second: Array, motion: HarmonicSolution
-) -> float:
-    """Return the distance between two points, relative to a motion."""
-    size = problem.vibration(motion.coefficients) or 1.0
+def _distance(first: Array, second: Array, size: float) -> float:
+    """Return the distance between two points, relative to the ``size`` of a vibration."""
     unknowns = float(np.linalg.norm(first[:-1] - second[:-1])) / size
     return max(unknowns, abs(first[-1] / second[-1] - 1.0))

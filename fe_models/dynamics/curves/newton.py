@@ -46,7 +46,7 @@ L_co = TypeVar("L_co", bound=Linearisation, covariant=True)
 class Equations(Protocol[L_co]):
     """Protocol of equations r(u, λ) and their derivatives, for unknowns u ``(n,)``."""
 
-    def __call__(self, unknowns: Array, parameter: float) -> L_co: ...
+    def __call__(self, unknowns: Array, parameter: float, /) -> L_co: ...
 
 
 @dataclass(frozen=True)

@@ -20,21 +20,20 @@ symmetric.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from fe_models.dynamics.curves.bordered import Bordered, LinearMap
-from fe_models.dynamics.curves.continuation import Refinement, follow
-from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, first_point
-from fe_models.dynamics.curves.forced_response import Accuracy, Motions, ResponseBranch, finer_for
-from fe_models.dynamics.curves.newton import NewtonControl, solve
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
+from fe_models.dynamics.curves.followed_curve import FollowedCurve
+from fe_models.dynamics.curves.forced_response import Motions, ResponseBranch
+from fe_models.dynamics.curves.motion_recorder import Accuracy, MotionRecorder
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError
 from fe_models.dynamics.periodic.receptance import SteadyMotion
-from fe_models.dynamics.periodic.resolution_error import resolution_error
 from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
@@ -232,16 +231,28 @@ def along_phase_resonance(
     if nearest.message:
         return Backbone((), f"the start is not a solution: {nearest.message}", problem)
     control = control or ContinuationControl()
-    equations = PhaseResonance.near(problem, nearest, output)
-    first = _start_resonance(_BackboneRecorder(equations, accuracy), nearest, control, steps)
+    curve = curve_by_phase(problem, nearest, output)
+    recorder = MotionRecorder(curve, accuracy)
+    first = recorder.find_first(curve.unknowns_of(nearest), nearest.force, True, control, steps)
     if isinstance(first, str):
-        return Backbone((), first, problem)
-    below = _half_backbone(first, False, forces, accuracy, control, steps)
-    above = _half_backbone(first, True, forces, accuracy, control, steps)
+        message = (
+            f"no phase resonance is found under {nearest.force:g} N from {nearest.frequency:.6g} "
+            f"Hz, so start from a motion nearer to the peak of the response; {first}"
+        )
+        return Backbone((), message, problem)
+    halves, messages = [], []
+    for end, point, name in ((low, first.turned(), "decreasing"), (high, first, "increasing")):
+        half = MotionRecorder(recorder.curve, accuracy)
+        if nearest.force != end:
+            followed = half.follow(point, forces, control, steps, end)
+            if followed.message:
+                messages.append(f"at {name} force, {followed.message}")
+        halves.append(half)
+    below, above = halves
     return Backbone(
-        (*reversed(below.solutions), first.solution, *above.solutions),
-        "; ".join(filter(None, (below.message, above.message))),
-        above.problem,
+        (*reversed(below.solutions), *recorder.solutions, *above.solutions),
+        "; ".join(messages),
+        above.curve.problem,
     )
 
 
@@ -328,114 +339,35 @@ class PhaseResonance:
         return PhaseBalance(self, balance, frequency, output)
 
 
-class _BackboneRecorder:
-    """Recorder of the motions of a backbone, which requests refined equations where needed."""
+def curve_by_phase(
+    problem: HarmonicBalance, near: HarmonicSolution, output: Array | None = None
+) -> FollowedCurve[PhaseBalance]:
+    """Return the curve of phase resonances, with the force as parameter.
 
-    def __init__(self, equations: PhaseResonance, accuracy: Accuracy | None) -> None:
-        self.equations, self._accuracy = equations, accuracy
-        self.solutions: list[HarmonicSolution] = []
-
-    def describe(self, point: CurvePoint, at: PhaseBalance) -> HarmonicSolution:
-        """Return the motion at a point, with its error if an accuracy is given."""
-        problem = self.equations.problem
-        solution = problem.describe(point.unknowns[:-1], at.balance, at.frequency, point.parameter)
-        if self._accuracy is not None:
-            solution = replace(solution, error=resolution_error(problem, solution))
-        return replace(solution, iterations=point.iterations, residual=at.relative)
-
-    def take(self, description: HarmonicSolution) -> Refinement[PhaseBalance] | None:
-        """Store a motion, or request refined equations if it is not accurate."""
-        problem = self.equations.problem
-        finer = finer_for(problem, description, self._accuracy)
-        if finer is not None:
-            return self._refine(finer)
-        self.solutions.append(replace(description, resolution=problem.resolution))
-        return None
-
-    def _refine(self, finer: Resolution) -> Refinement[PhaseBalance]:
-        problem = self.equations.problem
-        coarse, directions = problem.resolution, problem.joints.directions
-        self.equations = replace(self.equations, problem=problem.with_resolution(finer))
-
-        def lift(unknowns: Array) -> Array:
-            joints = unknowns[:-1].reshape(-1, coarse.size, directions)
-            return np.append(finer.adopt(joints, coarse), unknowns[-1])
-
-        return Refinement(self.equations, lift)
+    The motion ``near`` the curve sets the reference of the unknown frequency. For ``output`` see
+    :func:`along_phase_resonance`.
+    """
+    return _phase_curve(PhaseResonance.near(problem, near, output))
 
 
-@dataclass(frozen=True)
-class _StartResonance:
-    """Phase resonance from which the curve is followed ``down`` and ``up`` in force."""
+def _phase_curve(equations: PhaseResonance) -> FollowedCurve[PhaseBalance]:
+    problem = equations.problem
 
-    equations: PhaseResonance
-    down: CurvePoint
-    up: CurvePoint
-    solution: HarmonicSolution
+    def unknowns_of(motion: HarmonicSolution) -> Array:
+        return np.append(problem.guess(motion), equations.unknown_of(motion.frequency))
 
+    def motion_of(unknowns: Array, force: float, at: PhaseBalance) -> HarmonicSolution:
+        return problem.describe(unknowns[:-1], at.balance, at.frequency, force)
 
-def _start_resonance(
-    record: _BackboneRecorder, start: HarmonicSolution, control: ContinuationControl, steps: Steps
-) -> _StartResonance | str:
-    """Return the phase resonance under the force of the start, or the reason why there is none."""
-
-    def found(unknowns: Array) -> tuple[CurvePoint, CurvePoint, HarmonicSolution] | str:
-        resonance = solve(record.equations, unknowns, start.force, NewtonControl(control.tolerance))
-        if not resonance.converged:
-            return (
-                f"no phase resonance is found under {start.force:g} N from {start.frequency:.6g} "
-                f"Hz: Newton's method leaves a residual of {resonance.at.relative:.2g} after "
-                f"{resonance.iterations} iterations; start from a motion nearer to the peak of the "
-                "response"
-            )
-        down, up = (
-            first_point(resonance, start.force, upward, control.first) for upward in (False, True)
-        )
-        return down, up, record.describe(up, resonance.at)
-
-    unknowns = np.append(record.equations.problem.guess(start), 0.0)
-    while True:
-        first = steps("first phase resonance", partial(found, unknowns))
-        if isinstance(first, str):
-            return first
-        down, up, motion = first
-        finer = record.take(motion)
-        if finer is None:
-            return _StartResonance(record.equations, down, up, record.solutions[-1])
-        unknowns = finer.lift(up.unknowns)
-
-
-@dataclass(frozen=True)
-class _HalfBackbone:
-    """Motions on one side of the start; ``message`` says why there are not more, or is empty."""
-
-    solutions: tuple[HarmonicSolution, ...]
-    message: str
-    problem: HarmonicBalance
-
-
-def _half_backbone(
-    first: _StartResonance,
-    upward: bool,
-    forces: tuple[float, float],
-    accuracy: Accuracy | None,
-    control: ContinuationControl,
-    steps: Steps,
-) -> _HalfBackbone:
-    """Follow the curve from the start to one end of the forces."""
-    force, problem = first.solution.force, first.equations.problem
-    if force == forces[upward]:
-        return _HalfBackbone((), "", problem)
-    record = _BackboneRecorder(first.equations, accuracy)
-    point = first.up if upward else first.down
-    # Steps are relative to the vibration, as for forced responses.
-    rest = np.append(problem.guess(None), 0.0)
-    end = forces[upward]
-    curve = follow(first.equations, point, forces, control, record, rest, end=end, steps=steps)
-    message = curve.message
-    if message:
-        message = f"at {'increasing' if upward else 'decreasing'} force, {message}"
-    return _HalfBackbone(tuple(record.solutions), message, record.equations.problem)
+    return FollowedCurve(
+        problem,
+        equations,
+        np.append(problem.guess(None), 0.0),
+        unknowns_of,
+        lambda motion: motion.force,
+        motion_of,
+        lambda finer: _phase_curve(replace(equations, problem=finer)),
+    )
 
 
 def _weights(problem: HarmonicBalance, output: Array | None) -> ComplexArray:

@@ -25,7 +25,7 @@ import numpy as np
 from fe_models.dynamics.curves.bordered import LinearMap
 from fe_models.dynamics.curves.continuation import follow
 from fe_models.dynamics.curves.curve_steps import ContinuationControl, first_point
-from fe_models.dynamics.curves.newton import NewtonControl, NewtonSolution, solve
+from fe_models.dynamics.curves.newton import Equations, NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.curves.sizes import norm, relative_norm
 from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
@@ -225,13 +225,13 @@ class HarmonicBalance:
         """Number of unknowns."""
         return self.transfer.size
 
-    def by_frequency(self, force: float) -> _ByFrequency:
+    def by_frequency(self, force: float) -> Equations[Balance]:
         """Return the equations at a given force, with the frequency [Hz] as parameter."""
-        return _ByFrequency(self, force)
+        return lambda unknowns, frequency: self.evaluate(unknowns, frequency, force, "frequency")
 
-    def by_force(self, frequency: float) -> _ByForce:
+    def by_force(self, frequency: float) -> Equations[Balance]:
         """Return the equations at a given frequency [Hz], with the force as parameter."""
-        return _ByForce(self, frequency)
+        return lambda unknowns, force: self.evaluate(unknowns, frequency, force, "force")
 
     def solve(
         self, frequency: float, force: float, start: HarmonicSolution | None = None
@@ -474,25 +474,3 @@ class HarmonicBalance:
         size = norm(coefficients[:, first:]) + norm(self.transfer.shaped(response)[:, first:])
         by_joints = self.transfer.receptance.static_flexibility @ cycle.force[:, 0].ravel()
         return size + norm(by_joints) + norm(self.rest.loaded)
-
-
-@dataclass(frozen=True)
-class _ByFrequency:
-    """Equations at a given force, with the frequency as parameter."""
-
-    problem: HarmonicBalance
-    force: float
-
-    def __call__(self, unknowns: Array, parameter: float) -> Balance:
-        return self.problem.evaluate(unknowns, parameter, self.force, "frequency")
-
-
-@dataclass(frozen=True)
-class _ByForce:
-    """Equations at a given frequency, with the force as parameter."""
-
-    problem: HarmonicBalance
-    frequency: float
-
-    def __call__(self, unknowns: Array, parameter: float) -> Balance:
-        return self.problem.evaluate(unknowns, self.frequency, parameter, "force")

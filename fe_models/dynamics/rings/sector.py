@@ -196,14 +196,6 @@ class CyclicSector:
         )
 
 
-def stiffened(model: DynamicModel, tangents: Array) -> DynamicModel:
-    """Return a model with springs ``(j, d, d)`` [N/mm] in parallel to its joints."""
-    connection = model.connection
-    by_joint = connection.reshape(*tangents.shape[:2], -1)
-    springs = (tangents @ by_joint).reshape(connection.shape)
-    return replace(model, stiffness=model.stiffness + connection.conj().T @ springs)
-
-
 def lumped_sector(
     masses: Mapping[str, float],
     springs: Mapping[Link, float],

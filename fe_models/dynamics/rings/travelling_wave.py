@@ -15,10 +15,11 @@ from functools import cached_property
 
 import numpy as np
 
+from fe_models.dynamics.model import stiffened
 from fe_models.dynamics.periodic.harmonic_jacobian import HarmonicTransfer
 from fe_models.dynamics.periodic.harmonics import ComplexArray, Resolution
 from fe_models.dynamics.periodic.receptance import Receptance, SteadyMotion
-from fe_models.dynamics.rings.sector import CyclicSector, stiffened
+from fe_models.dynamics.rings.sector import CyclicSector
 from sa_solver.types import Array
 
 

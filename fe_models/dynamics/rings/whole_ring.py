@@ -7,7 +7,7 @@ whole ring, not of one sector.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from fe_models.dynamics.periodic.receptance import Receptance
 from fe_models.dynamics.rings.sector import CyclicSector, Ring
 from fe_models.dynamics.stability.deviating_structure import ModalStructure
 from sa_solver.types import Array, Indices
+
+# Axes of the joints in the arrays of deviations in which they do not come second.
+JOINT_AXES = {"pull": 0, "remembered": 0}
 
 
 @dataclass(frozen=True)
@@ -35,20 +38,14 @@ class JoinedDeviations:
     @classmethod
     def of(cls, parts: Iterable[Deviations]) -> JoinedDeviations:
         """Return the deviations of all parts, which have room for equally many state variables."""
-        all_parts = tuple(parts)
-
-        def concatenated(name: str, axis: int) -> Array:
-            return np.concatenate([getattr(part, name) for part in all_parts], axis=axis)
-
+        every = tuple(parts)
         return cls(
-            concatenated("kept", 1),
-            concatenated("by_start", 1),
-            concatenated("by_end", 1),
-            concatenated("pull", 0),
-            concatenated("tangent", 1),
-            concatenated("regimes", 1),
-            concatenated("force", 1),
-            np.concatenate([part.remembered for part in all_parts]),
+            **{
+                field.name: np.concatenate(
+                    [getattr(part, field.name) for part in every], JOINT_AXES.get(field.name, 1)
+                )
+                for field in fields(cls)
+            }
         )
 
 

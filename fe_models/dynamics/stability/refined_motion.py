@@ -103,7 +103,9 @@ class MotionInTime:
         self._frequency, self._mean = motion.frequency, motion.resolution.harmonics[0] == 0
         self._harmonics = np.array(motion.resolution.harmonics)
         self._load = _load(problem, motion, ring, len(structure.at_points))
-        sectors = [motion] if ring is None else _motions_of_sectors(ring, motion)
+        sectors = [motion]
+        if ring is not None:
+            sectors = [motion_of(ring, motion, sector) for sector in range(ring.sectors)]
         count, _, directions = motion.coefficients.shape
         # The functions of time are the displacements themselves.
         each = np.eye(count * directions).reshape(-1, count, directions)
@@ -220,11 +222,6 @@ class MotionInTime:
             return linearised(parts[0], 0)
         memory = max(linearised(part, 0).kept.shape[2] for part in parts)
         return JoinedDeviations.of(linearised(part, memory) for part in parts)
-
-
-def _motions_of_sectors(ring: Ring, motion: HarmonicSolution) -> list[HarmonicSolution]:
-    """Return the motions of all sectors of a ring."""
-    return [motion_of(ring, motion, sector) for sector in range(ring.sectors)]
 
 
 def _load(

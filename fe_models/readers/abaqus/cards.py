@@ -105,13 +105,21 @@ def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine
                 yield SourceLine(path, number), text
                 continue
             card = _card(SourceLine(path, number), text)
-            included = path.parent / card.name("INPUT")
-            if not included.is_file() or included in (*including, path):
-                raise MeshError(
-                    f"{card.place}: the included file {card.name('INPUT')} "
-                    + ("is missing" if not included.is_file() else "includes itself")
-                )
-            yield from _lines(included, (*including, path))
+            yield from _lines(*included_file(card.place, card.name("INPUT"), including))
+
+
+def included_file(
+    place: SourceLine, name: str, including: tuple[Path, ...]
+) -> tuple[Path, tuple[Path, ...]]:
+    """Return the path of a file that a line includes, and the files that include it.
+
+    Raises :class:`MeshError` if it is missing or includes itself.
+    """
+    included, including = place.path.parent / name, (*including, place.path)
+    if not included.is_file() or included in including:
+        why = "includes itself" if included.is_file() else "is missing"
+        raise MeshError(f"{place}: the included file {name} {why}")
+    return included, including
 
 
 def _card(place: SourceLine, text: str) -> Card:

@@ -25,6 +25,7 @@ from fe_models.readers.scene import (
     NotTakenError,
     Scene,
     Vector,
+    times,
 )
 from fe_models.readers.scope import Scope, existing
 
@@ -315,7 +316,7 @@ class _Reader:
         key = _key(kind, group, along)
         if not size and key not in self.loads:
             return
-        value = size if along is None else _times(along, size)
+        value = size if along is None else times(size, along)
         first = self.loads.setdefault(key, FileLoad(kind, group, value, (), line, through))
         factor = _ratio(value, first.value)
         if factor is None:
@@ -373,11 +374,6 @@ def _direction(vector: list[float]) -> Vector:
     if not length:
         raise NotTakenError("without a direction")
     x, y, z = (c / length for c in vector)
-    return x, y, z
-
-
-def _times(vector: Vector, size: float) -> Vector:
-    x, y, z = (size * c for c in vector)
     return x, y, z
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fe_models.meshes.structure_mesh import MeshError
-from fe_models.readers.abaqus.cards import SourceLine
+from fe_models.readers.abaqus.cards import SourceLine, included_file
 from fe_models.readers.text_files import open_text
 
 SMALL, LARGE = 8, 16
@@ -102,13 +102,7 @@ def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine
             if match is None:
                 yield place, text
                 continue
-            included = path.parent / match[1]
-            if not included.is_file() or included in (*including, path):
-                raise MeshError(
-                    f"{place}: the included file {match[1]} "
-                    + ("is missing" if not included.is_file() else "includes itself")
-                )
-            yield from _lines(included, (*including, path))
+            yield from _lines(*included_file(place, match[1], including))
 
 
 def _take(entries: list[BulkEntry], place: SourceLine, line: str) -> None:
@@ -120,7 +114,9 @@ def _take(entries: list[BulkEntry], place: SourceLine, line: str) -> None:
     if not head or head[0] in "+*":
         if not entries:
             raise MeshError(f"{place}: is not Nastran bulk data; allowed: entries such as GRID")
-        entries[-1].fields += _filled(entries[-1].fields, width) + fields
+        known = entries[-1].fields
+        # Empty fields complete the line before, of 4 or 8 fields.
+        known += [""] * (-len(known) % width) + fields
         return
     name = head.rstrip("*").upper()
     if not re.fullmatch(r"[A-Z]\w*", name):
@@ -141,11 +137,6 @@ def _divided(text: str) -> tuple[str, list[str], int]:
     width, count = (LARGE, 4) if "*" in head else (SMALL, 8)
     body = text[SMALL : SMALL + width * count]
     return head, [body[k : k + width].strip() for k in range(0, len(body), width)], count
-
-
-def _filled(fields: list[str], width: int) -> list[str]:
-    """Return the empty fields that complete a line of 4 or 8 fields."""
-    return [""] * (-len(fields) % width)
 
 
 def summary_line(entry: BulkEntry) -> str:

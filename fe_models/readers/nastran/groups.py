@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from fe_models.readers.grouped import DIMENSION, FACE_SHAPES, FACES
+from fe_models.readers.grouped import DIMENSION, FACES
 from fe_models.readers.nastran.cards import BulkEntry
 from fe_models.readers.scope import Element, Scope, extend
 
@@ -17,7 +17,6 @@ class Groups:
 
     def __init__(self, scope: Scope) -> None:
         self.scope = scope
-        self._facets = 0
         self._handlers: dict[str, Callable[[BulkEntry], None]] = {
             "SPC1": self._held,
             "SPC": self._held_singly,
@@ -87,12 +86,8 @@ class Groups:
         return found[0]
 
     def _facet(self, entry: BulkEntry, nodes: tuple[int, ...]) -> None:
-        self._facets -= 1
-        self.scope.elements[self._facets] = Element(
-            FACE_SHAPES[len(nodes)], nodes, (), entry.place, entry.name, stands_alone=False
-        )
-        name = f"{entry.name.lower()}_{entry.text(0)}"
-        extend(self.scope.element_sets.add(name, {}), {"": [self._facets]})
+        members = self.scope.element_sets.add(f"{entry.name.lower()}_{entry.text(0)}", {})
+        self.scope.add_facet(members, nodes, entry.place, entry.name)
 
 
 def held_name(number: str, components: str) -> str:

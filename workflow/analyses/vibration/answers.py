@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from fe_models.dynamics.curves.crossings import motions_at
-from fe_models.dynamics.curves.forced_response import Accuracy, ResponseBranch
+from fe_models.dynamics.curves.forced_response import ResponseBranch
+from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
 from workflow.analyses.vibration.case.vibration_case import VibrationCase

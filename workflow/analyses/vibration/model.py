@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.dynamics.curves.curve_steps import ContinuationControl
-from fe_models.dynamics.curves.forced_response import Accuracy
+from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.periodic.harmonics import Resolution
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig.building import rig_model

@@ -8,17 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.curves.followed_curve import (
-    curve_by_force,
-    curve_by_frequency,
-    curve_by_phase,
-)
+from fe_models.dynamics.curves.followed_curve import curve_by_force, curve_by_frequency
 from fe_models.dynamics.curves.forced_response import (
     ResponseBranch,
     along_force,
 )
 from fe_models.dynamics.curves.further_branches import FurtherBranch
-from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
+from fe_models.dynamics.curves.phase_resonance import along_phase_resonance, curve_by_phase
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps

@@ -199,41 +199,4 @@ try:
 except PackageNotFoundError:  # a checkout that is not installed
     __version__ = "unknown"
 
-__getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        "fe_models.dovetail": ("Mission",),
-        "fe_models.geometry.dovetail": ("Dovetail",),
-        "wear.coupled_state": ("Observer",),
-        "wear.schedule": ("JumpSize", "Stop"),
-        "wear.evolution": ("CoulombFriction",),
-        "workflow.errors": (
-            "CaseError",
-            "FretscaleError",
-            "MethodFailed",
-            "ModelWarning",
-            "NotWritten",
-            "OutOfMemory",
-            "UserError",
-        ),
-        "workflow.interface.cases": ("Check", "check", "load_case"),
-        "workflow.interface.comparing": ("ComparedResult", "Comparison", "compare"),
-        "workflow.interface.datasets": ("Group",),
-        "workflow.interface.fitting": ("FitResult", "FittedParameter", "fit"),
-        "workflow.interface.results": ("MainResult", "Results", "open"),
-        "workflow.interface.running": ("run",),
-        "workflow.interface.modelling": ("vibration_model", "wear_model"),
-        "workflow.interface.observers": ("Checkpoint", "Progress"),
-        "workflow.models.assembly": ("LegPath", "MeshAssembly", "TightenedBolt"),
-        "workflow.models.contact": ("Contact", "Wear"),
-        "workflow.models.dovetail": ("DovetailJoint", "DovetailMesh"),
-        "workflow.models.gaps": ("AddedGap",),
-        "workflow.models.loads": ("ContactFace", "LoadSource", "UncoupledSource"),
-        "workflow.models.rig.motion": ("MotionModel",),
-        "workflow.models.rig.rig_model": ("RigModel",),
-        "workflow.models.vibration.model": ("VibrationModel",),
-        "workflow.models.vibration.sweep": ("FrequencySweep",),
-        "workflow.models.wear": ("WearModel",),
-    },
-    within="",
-)
+__getattr__, __dir__ = lazy_names(__name__)

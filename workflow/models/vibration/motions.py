@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fe_models.dynamics.curves.forced_response import Accuracy, ResponseBranch, finer_resolution
+from fe_models.dynamics.curves.forced_response import ResponseBranch
+from fe_models.dynamics.curves.motion_recorder import Accuracy, finer_resolution
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from fe_models.dynamics.curves.curve_steps import ContinuationControl
-from fe_models.dynamics.curves.forced_response import Accuracy, ResponseBranch, along_frequency
+from fe_models.dynamics.curves.forced_response import ResponseBranch, along_frequency
+from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array

@@ -9,7 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 from fe_models.dynamics.curves.curve_steps import ContinuationControl
-from fe_models.dynamics.curves.forced_response import Accuracy, along_frequency
+from fe_models.dynamics.curves.forced_response import along_frequency
+from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.curves.phase_resonance import PhaseResonance, along_phase_resonance
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.periodic import harmonic_balance

@@ -12,6 +12,7 @@ from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import curve_by_force, curve_by_frequency
 from fe_models.dynamics.curves.forced_response import along_force, along_frequency
 from fe_models.dynamics.curves.further_branches import further_branches, vibrating_starts
+from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
 from fe_models.dynamics.motion import Start
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
@@ -362,6 +363,19 @@ def test_motions_of_a_third_of_the_frequency_are_on_a_closed_branch():
         problem, 5.0, span, starts, at, [branch.solutions, *(each.solutions for each in found)]
     )
     assert again == ()
+
+
+def test_further_branches_are_as_accurate_as_requested():
+    """Harmonics are added on the way, also to the motion from which the branch is followed."""
+    problem, at = duffing(1), 1.4 / TURN
+    start = problem.guess(problem.solve(at, 0.3))
+    accuracy = Accuracy(1e-3)
+    (branch,) = further_branches(
+        problem, 0.3, (0.5 * at, 1.5 * at), [start], at, [], accuracy=accuracy
+    )
+    assert branch.message == ""
+    assert max(motion.error.largest for motion in branch.solutions) <= accuracy.tolerance
+    assert 3 in branch.problem.resolution.harmonics
 
 
 def test_a_reduced_structure_has_the_multipliers_of_all_modes(monkeypatch):

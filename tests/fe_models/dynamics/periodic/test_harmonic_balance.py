@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
+from fe_models.dynamics.curves.forced_response import along_force, along_frequency
+from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.periodic import harmonic_balance, harmonic_jacobian, modal_inverse
 from fe_models.dynamics.periodic.cycle_energy import energy_lost

@@ -16,7 +16,7 @@ from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
 from fe_models.dynamics.rings.sector import CyclicSector, reduced_sector
 from fe_models.joints.reduction import STEPS, ReducedModel
 from fe_models.matrices import MatrixError
-from fe_models.matrices.reduction import listed_names
+from fe_models.matrices.unknowns import listed_names
 from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.types import Array, Progress, Tally
 from workflow.analyses.rig.bodies.matrix_body import LoadCase, MatrixBody
