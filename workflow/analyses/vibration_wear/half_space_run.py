@@ -23,6 +23,7 @@ from wear.steps.steppers import first_cycles
 from wear.steps.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.vibration.case.load import driving_of
+from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.loops import closed
 from workflow.analyses.vibration.output.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearCase
@@ -119,7 +120,8 @@ class _Description:
         model = VibratingStructure(
             rig, Jenkins(stiffness, friction, load), problem, self.contact.driving
         )
-        error, responses = responses_to_all(case, model, cycle.motion, self.reporter, self.steps)
+        run = VibrationRun(case, model, self.reporter, self.steps)
+        error, responses = responses_to_all(run, cycle.motion)
         return error, responses, {"free": rig.free(), **rig.modes(model.law)}
 
     def _numbers(self, cycle: ContactCycle) -> dict[str, Any]:

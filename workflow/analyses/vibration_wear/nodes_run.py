@@ -18,7 +18,7 @@ from wear.laws import WearLaw
 from wear.steps.steppers import HeunStepper
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.analyses.vibration.case.vibration_case import VibrationCase
+from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.model import step_control, structure_numbers, vibration_model
 from workflow.analyses.vibration.output.loops import loop_of
 from workflow.analyses.vibration.output.outcome import Curves
@@ -61,8 +61,9 @@ def wear_nodes(
         pads.at(state)
 
     def describe(state: NodalState, cycles: float, taken: int) -> WornRig:
-        reached = cycles, taken
-        worn = _worn_state(case.unworn, pads.at(state), state, reached, reporter, steps)
+        cycle = pads.at(state)
+        run = VibrationRun(case.unworn, cycle.model, reporter, steps)
+        worn = _worn_state(run, cycle, state, cycles, taken)
         if worn.numbers["step_error"] > wear.tolerance:
             reporter.warn(
                 f"{cycles:g} cycles: wear steps cause an error of "
@@ -121,22 +122,14 @@ def _nodes(rig: RigModel) -> WornNodes:
 
 
 def _worn_state(
-    case: VibrationCase,
-    cycle: PadCycle,
-    state: NodalState,
-    reached: tuple[float, int],
-    reporter: Reporter,
-    steps: Steps,
+    run: VibrationRun, cycle: PadCycle, state: NodalState, cycles: float, taken: int
 ) -> WornRig:
-    """Return the pads in a state.
-
-    ``reached`` is the number of cycles in all, and of wear steps since the last state.
-    """
-    cycles, taken = reached
-    loop = loop_of(cycle.model, cycle.motion, case.laws[0].normal_load)
-    error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
+    """Return the pads after a number of ``cycles``, ``taken`` wear steps after the last state."""
     problem, motion = cycle.model.problem, cycle.motion
-    warn_of_stroke(cycle.model, f"{cycles:g} cycles: in the motion that wears", motion, reporter)
+    loop = loop_of(cycle.model, motion, run.case.laws[0].normal_load)
+    error, responses = responses_to_all(run, motion)
+    at = f"{cycles:g} cycles: in the motion that wears"
+    warn_of_stroke(cycle.model, at, motion, run.reporter)
     depth = state.surfaces.depth
     numbers: dict[str, Any] = {
         "cycles": cycles,
@@ -157,7 +150,7 @@ def _worn_state(
         "error": error,
         **structure_numbers(cycle.model),
     }
-    reporter.log(
+    run.reporter.log(
         f"{cycles:g} cycles: {counted(taken, 'step')}, "
         f"{counted(numbers['touching'], 'node')} touching, stroke {numbers['stroke']:.4g} mm"
     )
