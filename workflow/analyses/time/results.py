@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from workflow.analyses.time.case import JointCase, RigCase, TimeCase, joules
-from workflow.analyses.time.outcome import EVOLUTION, LAYOUT, MOTION, State, TimeOutcome
+from workflow.analyses.time.outcome import LAYOUT, State, TimeOutcome
 from workflow.case.fields import in_unit_of
 from workflow.shell.analysis import Run
 from workflow.shell.output.results import run_results
@@ -36,10 +36,10 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
     attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": outcome.seen or None}
     with run_results(run, case, LAYOUT, attributes) as writer:
         writer.put_contents(outcome.contents)
-        writer.put(EVOLUTION, outcome.evolution)
+        writer.put("evolution", outcome.evolution)
         what = "parameters of the joint over the energy it has dissipated"
-        path = folder.reserve(f"{EVOLUTION}.csv", what)
-        write_curves(path, outcome.evolution, LAYOUT.datasets(EVOLUTION))
+        path = folder.reserve("evolution.csv", what)
+        write_curves(path, outcome.evolution, LAYOUT.datasets("evolution"))
         for number, state in enumerate(outcome.states):
             place = f"states/{number:05d}"
             scalars = {k: v for k, v in state.numbers.items() if isinstance(v, int | float | list)}
@@ -47,7 +47,7 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
             writer.put(place, {}, **(parameters | scalars))
             for group, curves in state.curves.items():
                 writer.put(f"{place}/{group}", curves)
-                if group == MOTION:
+                if group == "motion":
                     continue
                 what = f"{group.replace('_', ' ')} at {joules(state.energy)}"
                 path = folder.reserve(f"{group}_{number:05d}.csv", what)

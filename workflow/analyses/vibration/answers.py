@@ -13,7 +13,7 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.model import step_control
 from workflow.analyses.vibration.output.harmonics import harmonics_of
-from workflow.analyses.vibration.output.outcome import ANSWER, Answers
+from workflow.analyses.vibration.output.outcome import Answers
 from workflow.analyses.vibration.response import warn_of_error
 from workflow.layout.declared import Arrays
 from workflow.models.vibration.motions import accurate, motion_columns
@@ -57,8 +57,7 @@ def answers_under(
         numbers.append({"frequency": frequency, "motions": those, "message": message})
         every += motions
     harmonics: dict[str, Arrays] = {
-        ANSWER.format(number): harmonics_of(model.rig, motion)
-        for number, motion in enumerate(every)
+        f"at_{number:05d}": harmonics_of(model.rig, motion) for number, motion in enumerate(every)
     }
     return Answers(_table(model, branch, every), tuple(numbers)), harmonics
 

@@ -20,7 +20,6 @@ from workflow.analyses.vibration.case.load import driving_of
 from workflow.analyses.vibration.case.ring import frequencies_by_diameters
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.memory import memory
-from workflow.analyses.vibration.output.outcome import RING
 from workflow.case.sections import Case
 from workflow.errors import UserError
 from workflow.layout.declared import Arrays
@@ -128,7 +127,7 @@ def structure_numbers(structure: VibratingStructure) -> dict[str, Any]:
     }
     if rig.sector is not None:
         ring = rig.sector.ring
-        numbers[RING] = {"sectors": ring.sectors, "engine_order": ring.engine_order}
+        numbers["ring"] = {"sectors": ring.sectors, "engine_order": ring.engine_order}
     if structure.driving.left_out:
         numbers["left_out_of_records"] = list(structure.driving.left_out)
     if rig.pressing is not None:

@@ -22,7 +22,7 @@ from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.model import sweep_of
 from workflow.analyses.vibration.output.harmonics import harmonics_of
 from workflow.analyses.vibration.output.loops import loops_of
-from workflow.analyses.vibration.output.outcome import DIAMETERS, RESONANCE, Curves, Response
+from workflow.analyses.vibration.output.outcome import Curves, Response
 from workflow.analyses.vibration.stability import stability_along
 from workflow.case.text.plain import shares
 from workflow.errors import MethodFailed
@@ -66,7 +66,7 @@ def response_under(run: VibrationRun, force: float) -> tuple[Response, ResponseB
         nodes=_nodes(branch),
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
         loops=loops_of(run, branch),
-        harmonics={RESONANCE: harmonics_of(model.rig, resonance)},
+        harmonics={"resonance": harmonics_of(model.rig, resonance)},
         bifurcations=stability.bifurcations,
     )
     warn_of_error(run, f"{reported}: the motion", response.numbers["error"])
@@ -186,7 +186,7 @@ def _beside(run: VibrationRun, resonance: HarmonicSolution) -> dict[str, Any]:
         numbers["speed"] = case.turning * resonance.frequency
     if model.rig.sector is not None:
         ring, harmonics = model.rig.sector.ring, resonance.resolution.harmonics
-        numbers[DIAMETERS] = [ring.diameters(harmonic) for harmonic in harmonics]
+        numbers["nodal_diameters"] = [ring.diameters(harmonic) for harmonic in harmonics]
     return numbers
 
 

@@ -24,13 +24,7 @@ from workflow.analyses.vibration.model import (
 )
 from workflow.analyses.vibration.modes import mode_of, refuse_missing_modes
 from workflow.analyses.vibration.output.harmonics import harmonics_along, names_of
-from workflow.analyses.vibration.output.outcome import (
-    CURVE,
-    Curves,
-    Response,
-    VibrationOutcome,
-    trend,
-)
+from workflow.analyses.vibration.output.outcome import Curves, Response, VibrationOutcome, trend
 from workflow.analyses.vibration.output.results import write_vibration_output
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.stability import looked_for
@@ -86,7 +80,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
                 answers, of_answers = answers_under(following, branch)
                 harmonics = {**response.harmonics, **of_answers}
                 if case.harmonics_along_curves:
-                    harmonics[CURVE] = harmonics_along(model.rig, branch, reporter)
+                    harmonics["curve"] = harmonics_along(model.rig, branch, reporter)
             responses.append(replace(response, answers=answers, harmonics=harmonics))
             known: list[ResponseBranch | FurtherBranch] = [branch]
             for start in (start for start in case.further_branches if start.force == force):

@@ -28,10 +28,6 @@ from workflow.analyses.vibration.output.loops import closed
 from workflow.analyses.vibration.output.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.output.outcome import (
-    CONTACT,
-    HALF_SPACE,
-    LOOP,
-    SLIDERS,
     VibrationWearOutcome,
     WornRig,
     step_error,
@@ -171,10 +167,10 @@ def _fields(cycle: ContactCycle, loop: TangentialLoop) -> dict[str, Arrays]:
     displacement, force = loop.cycle
     moved, pulled = cycle.displacement, cycle.motion.cycle.samples[:, 0, 0]
     return {
-        CONTACT: _contact_fields(cycle),
-        SLIDERS: _sliders(cycle),
-        LOOP: {"displacement": closed(moved), "force": closed(pulled)},
-        HALF_SPACE: {"displacement": displacement, "force": force},
+        "contact": _contact_fields(cycle),
+        "sliders": _sliders(cycle),
+        "loop": {"displacement": closed(moved), "force": closed(pulled)},
+        "half_space_loop": {"displacement": displacement, "force": force},
     }
 
 

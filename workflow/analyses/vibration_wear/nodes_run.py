@@ -30,9 +30,6 @@ from workflow.analyses.vibration_wear.case import (
     ReducedWearCase,
 )
 from workflow.analyses.vibration_wear.output.outcome import (
-    LOOP,
-    NODES,
-    POSITION,
     VibrationWearOutcome,
     WornNodes,
     WornRig,
@@ -115,7 +112,7 @@ def _nodes(rig: RigModel) -> WornNodes:
         return WornNodes({**on_plane, "area": rig.area})
     bodies = {"normal": nodes.normals}
     if nodes.places is not None:
-        bodies[POSITION] = nodes.places
+        bodies["position"] = nodes.places
         if len(rig.places):
             bodies |= on_plane
     return WornNodes(bodies | {"area": rig.area}, nodes.names)
@@ -160,7 +157,7 @@ def _worn_state(
 def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, Arrays]:
     depth_1, depth_2 = state.surfaces.depths
     return {
-        NODES: {
+        "nodes": {
             "gap": cycle.model.rig.gap,
             "depth_1": depth_1,
             "depth_2": depth_2,
@@ -168,5 +165,5 @@ def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, Array
             "path": cycle.path,
             "energy": cycle.energy,
         },
-        LOOP: {name: loop.arrays[name] for name in ("displacement", "force")},
+        "loop": {name: loop.arrays[name] for name in ("displacement", "force")},
     }

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
@@ -29,7 +28,14 @@ from workflow.pictures.fields import (
     scaled_panels,
     view_of,
 )
-from workflow.pictures.panels import Figures, legend_below, new_figure, shaded, spread
+from workflow.pictures.panels import (
+    Figures,
+    legend_below,
+    legend_of_colours,
+    new_figure,
+    shaded,
+    spread,
+)
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE
 from workflow.shell.output.results import grid_of, own
@@ -178,11 +184,7 @@ def _draw_regions(
     _draw_arrows(axis, state["shear"][()], grid, view, turned)
     stuck = np.count_nonzero(regions == 1.0) / max(int(np.count_nonzero(pressed)), 1)
     axis.set_title(f"shear on body 2: {percent(stuck)} of the contact sticks")
-    figure.legend(
-        handles=[Patch(color=STICK, label="stick"), Patch(color=SLIP, label="slip")],
-        loc="outside lower center",
-        ncols=2,
-    )
+    legend_of_colours(figure, {"stick": STICK, "slip": SLIP})
 
 
 def _draw_arrows(axis: Axes, shear: Array, grid: Grid, view: FaceWindow, turned: bool) -> None:

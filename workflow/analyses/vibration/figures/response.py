@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import h5py
@@ -23,13 +22,14 @@ from workflow.analyses.vibration.figures.stability import (
     mark_bifurcations,
 )
 from workflow.analyses.vibration.figures.states import node_states, pad_states
-from workflow.analyses.vibration.output.outcome import AT, FURTHER, VibrationContents
+from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.pictures.panels import (
     Figures,
     legend_below,
     new_figure,
     plain_ticks,
+    present,
     shaded,
 )
 from workflow.pictures.scales import TO_MICRONS
@@ -63,9 +63,7 @@ def figures_of(contents: VibrationContents) -> Figures:
         "node_states": (node_states, contents.places),
         "pad_states": (pad_states, contents.places),
     }
-    return {
-        name: partial(draw, contents=contents) for name, (draw, there) in drawn.items() if there
-    }
+    return present(drawn, contents)
 
 
 def _shown(file: h5py.File, contents: VibrationContents) -> list[tuple[h5py.Group, Any]]:
@@ -116,7 +114,7 @@ def frequency_response(file: h5py.File, contents: VibrationContents) -> Figure:
         lows.append(size.min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
         if contents.at:
-            asked = response[AT]
+            asked = response["at"]
             sizes = TO_MICRONS * asked["amplitude"][:, -1] / force
             axis.plot(asked["frequency"][()], sizes, "D", color=colour, **ASKED)
     drawn = [response for response, _ in _shown(file, contents)]
@@ -151,7 +149,9 @@ def _draw_further(
     amount = _amount_of(file).name
     colours = {response.attrs[amount]: colour for response, colour in _shown(file, contents)}
     branches = [
-        branch for branch in file.get(FURTHER, {}).values() if branch.attrs[amount] in colours
+        branch
+        for branch in file.get("further_branches", {}).values()
+        if branch.attrs[amount] in colours
     ]
     for branch in branches:
         force = float(branch.attrs[amount])

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from sa_solver.types import Array
-from workflow.analyses.vibration.output.outcome import BIFURCATIONS
 from workflow.pictures.style import BLACK
 
 # Line styles by code of stability. Between two points, the smaller code counts.
@@ -54,9 +53,9 @@ def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
 
 def mark_bifurcations(axis: Axes, group: h5py.Group, x: str, factor: float, colour: Any) -> None:
     """Mark bifurcations on the curve of a group, over ``x``: the amplitude times a factor."""
-    if BIFURCATIONS not in group:
+    if "bifurcations" not in group:
         return
-    found = group[BIFURCATIONS]
+    found = group["bifurcations"]
     for kind, at, amplitude in zip(
         found.attrs["kind"], found[x][()], found["amplitude"][()], strict=True
     ):
@@ -73,8 +72,8 @@ def explain_stability(axis: Axes, groups: list[h5py.Group]) -> None:
     kinds = {
         kind
         for group in groups
-        if BIFURCATIONS in group
-        for kind in group[BIFURCATIONS].attrs["kind"]
+        if "bifurcations" in group
+        for kind in group["bifurcations"].attrs["kind"]
     }
     for kind, (mark, word) in MARKS.items():
         if kind in kinds:

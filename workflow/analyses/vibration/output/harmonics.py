@@ -13,7 +13,7 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray
 from sa_solver.types import Array
 from workflow.analyses.vibration.output.layout import CONVENTION
-from workflow.analyses.vibration.output.outcome import CURVE, RESONANCE, Response
+from workflow.analyses.vibration.output.outcome import Response
 from workflow.layout.declared import Arrays
 from workflow.models.rig.rig_model import RigModel
 from workflow.shell.output.tables import DIGITS, heading, write_table
@@ -90,14 +90,14 @@ def write_harmonics(path: Path, names: Arrays, response: Response) -> None:
     rows = [
         row
         for group, values in response.harmonics.items()
-        if group != CURVE
+        if group != "curve"
         for row in _rows(group, values, names)
     ]
     write_table(path, _columns(rows), DIGITS, note=f"{CONVENTION}; against the ground")
 
 
 def _rows(group: str, values: Arrays, names: Arrays) -> Iterator[Mapping[str, Any]]:
-    motion = RESONANCE if group == RESONANCE else str(int(group.rpartition("_")[2]) + 1)
+    motion = "resonance" if group == "resonance" else str(int(group.rpartition("_")[2]) + 1)
     places, joints = (names[kind].ravel().tolist() for kind in ("places", "joints"))
     for k, order in enumerate(values["harmonic"].tolist()):
         begin = {

@@ -8,7 +8,6 @@ from typing import Any
 
 from workflow.analyses.vibration.case.excitation import amount_in, under_in
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.output.outcome import AT, MODES
 from workflow.models.vibration.amount import LEVEL
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
@@ -87,8 +86,8 @@ def main_results(case: VibrationCase, summary: Summary) -> list[SummaryQuantity]
     )
     modes = (
         quantity
-        for number, mode in enumerate(summary.get(MODES, ()))
-        for quantity in _of_mode(f"mode {mode['mode']}", f"{MODES}.{number}", summary)
+        for number, mode in enumerate(summary.get("modes", ()))
+        for quantity in _of_mode(f"mode {mode['mode']}", f"modes.{number}", summary)
     )
     return reported(summary, [*limits, *records, *responses, *modes])
 
@@ -116,10 +115,10 @@ def _of_answers(
     group: str, path: str, response: Mapping[str, Any], summary: Summary
 ) -> Iterator[SummaryQuantity]:
     """Yield results of motions at the frequencies of the case, of each one that coexists."""
-    for place, answer in enumerate(response.get(AT, ())):
+    for place, answer in enumerate(response.get("at", ())):
         count = len(answer["motions"])
         for number in range(count):
-            of = f"{path}.{AT}.{place}.motions.{number}"
+            of = f"{path}.at.{place}.motions.{number}"
             error = estimate(summary, f"{of}.error", ERROR)
             which = f", motion {number + 1} of {count}" if count > 1 else ""
             suffix = f" at {answer['frequency']:g} Hz{which}"

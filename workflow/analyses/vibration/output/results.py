@@ -10,19 +10,6 @@ from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.output.harmonics import write_harmonics
 from workflow.analyses.vibration.output.layout import bifurcation_columns, layout_of
 from workflow.analyses.vibration.output.outcome import (
-    AT,
-    BACKBONE,
-    BIFURCATIONS,
-    DIAMETERS,
-    FORCE_SWEEPS,
-    FURTHER,
-    HARMONICS,
-    LOOPS,
-    MODES,
-    NODES,
-    RESONANCE,
-    RESPONSES,
-    RING,
     Answers,
     Bifurcations,
     Curves,
@@ -70,9 +57,11 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
         writer.put("linear", outcome.linear, **limits)
         writer.put("names", outcome.names)
         if outcome.diameters is not None:
-            writer.put(DIAMETERS, outcome.diameters, **outcome.numbers[RING])
-            path = folder.reserve(f"{DIAMETERS}.csv", "natural frequencies, over nodal diameters")
-            write_curves(path, outcome.diameters, layout.datasets(DIAMETERS))
+            writer.put("nodal_diameters", outcome.diameters, **outcome.numbers["ring"])
+            path = folder.reserve(
+                "nodal_diameters.csv", "natural frequencies, over nodal diameters"
+            )
+            write_curves(path, outcome.diameters, layout.datasets("nodal_diameters"))
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
@@ -82,7 +71,7 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
             _put_bifurcations(writer, place, curve.bifurcations, case.amount)
             write_curves(folder.reserve(f"{name}.csv", what), curve.arrays, layout.datasets(place))
     if found := list(_every_bifurcation(outcome)):
-        path = folder.reserve(f"{BIFURCATIONS}.csv", "where the stability of motions changes")
+        path = folder.reserve("bifurcations.csv", "where the stability of motions changes")
         columns: dict[str, list[Any]] = {
             "curve": [curve for curve, _ in found],
             "kind": [each["kind"] for _, each in found],
@@ -97,16 +86,16 @@ def _curves(outcome: VibrationOutcome) -> Iterator[tuple[str, str, str, Curves]]
     amount = outcome.case.amount
     over = f"over the {amount.name}"
     if outcome.backbone is not None:
-        yield BACKBONE, BACKBONE, f"phase resonance, {over}", outcome.backbone
+        yield "backbone", "backbone", f"phase resonance, {over}", outcome.backbone
     for number, branch in enumerate(outcome.further):
         what = f"further branch {amount.under(branch.numbers[amount.name])}, over frequency"
-        yield f"{FURTHER}/{number:05d}", f"further_branch_{number:05d}", what, branch
+        yield f"further_branches/{number:05d}", f"further_branch_{number:05d}", what, branch
     for number, sweep in enumerate(outcome.force_sweeps):
         what = f"response at {sweep.numbers['frequency']:g} Hz, {over}"
-        yield f"{FORCE_SWEEPS}/{number:05d}", f"force_sweep_{number:05d}", what, sweep
+        yield f"force_sweeps/{number:05d}", f"force_sweep_{number:05d}", what, sweep
     for number, mode in enumerate(outcome.modes):
         what = f"mode {mode.numbers['mode']}, over its amplitude"
-        yield f"{MODES}/{number:05d}", f"mode_{mode.numbers['mode']:05d}", what, mode
+        yield f"modes/{number:05d}", f"mode_{mode.numbers['mode']:05d}", what, mode
 
 
 def _put_response(
@@ -117,7 +106,7 @@ def _put_response(
     folder: OutputFolder,
 ) -> None:
     """Write a response, its harmonics, loops and motions at given frequencies, and their tables."""
-    amount, place = outcome.case.amount, f"{RESPONSES}/{number:05d}"
+    amount, place = outcome.case.amount, f"responses/{number:05d}"
     under, layout = amount.under(response.force), layout_of(amount)
 
     def write_csv(name: str, what: str, curves: Arrays, *groups: str) -> None:
@@ -127,23 +116,23 @@ def _put_response(
 
     put_response_curves(writer, place, amount, response)
     write_csv("frf", f"response {under}, over frequency", response.curves, place)
-    nodes = f"{place}/{NODES}"
+    nodes = f"{place}/nodes"
     writer.put(nodes, response.nodes)
     frequency = {"frequency": response.curves["frequency"]}
     what = f"what each joint does {under}"
     write_csv("joints", what, {**frequency, **response.nodes}, place, nodes)
     if response.resonance is not None:
-        writer.put(f"{place}/{RESONANCE}", response.resonance)
+        writer.put(f"{place}/resonance", response.resonance)
     for count, loop in enumerate(response.loops):
-        writer.put(f"{place}/{LOOPS}/{count:05d}", loop.arrays, **loop.numbers)
+        writer.put(f"{place}/loops/{count:05d}", loop.arrays, **loop.numbers)
     for loop in response.loops[-1:]:
-        write_csv("loop", f"loop of the joints {under}", loop.arrays, f"{place}/{LOOPS}/-")
+        write_csv("loop", f"loop of the joints {under}", loop.arrays, f"{place}/loops/-")
     if response.answers is not None:
         answers = response.answers.arrays
-        writer.put(f"{place}/{AT}", answers)
-        write_csv("at", f"motions {under}, as requested", answers, f"{place}/{AT}")
+        writer.put(f"{place}/at", answers)
+        write_csv("at", f"motions {under}, as requested", answers, f"{place}/at")
     for of, arrays in response.harmonics.items():
-        writer.put(f"{place}/{HARMONICS}/{of}", arrays)
+        writer.put(f"{place}/harmonics/{of}", arrays)
     what = f"harmonics of places and joints {under}, at resonance and as requested"
     path = folder.reserve(f"harmonics_{number:05d}.csv", what)
     write_harmonics(path, outcome.names, response)
@@ -157,7 +146,7 @@ def _put_bifurcations(
     if bifurcations:
         kinds = [str(found["kind"]) for found in bifurcations]
         arrays = bifurcation_arrays(bifurcations, amount)
-        writer.put(f"{place}/{BIFURCATIONS}", arrays, kind=kinds)
+        writer.put(f"{place}/bifurcations", arrays, kind=kinds)
 
 
 def put_response_curves(
@@ -177,7 +166,7 @@ def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping
     for number, branch in enumerate(outcome.further):
         yield from ((f"further branch {number}", found) for found in branch.bifurcations)
     if outcome.backbone is not None:
-        yield from ((BACKBONE, found) for found in outcome.backbone.bifurcations)
+        yield from (("backbone", found) for found in outcome.backbone.bifurcations)
     for sweep in outcome.force_sweeps:
         at = f"{sweep.numbers['frequency']:g} Hz"
         yield from ((at, found) for found in sweep.bifurcations)
@@ -196,31 +185,31 @@ def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
     }
     if outcome.backbone is not None:
         points = len(outcome.backbone.arrays["frequency"])
-        summary[BACKBONE] = {"points": points, **_curve_summary(outcome.backbone)}
+        summary["backbone"] = {"points": points, **_curve_summary(outcome.backbone)}
     if outcome.force_sweeps:
-        summary[FORCE_SWEEPS] = [_curve_summary(sweep) for sweep in outcome.force_sweeps]
+        summary["force_sweeps"] = [_curve_summary(sweep) for sweep in outcome.force_sweeps]
     if outcome.further:
-        summary[FURTHER] = [_curve_summary(branch) for branch in outcome.further]
+        summary["further_branches"] = [_curve_summary(branch) for branch in outcome.further]
     if outcome.modes:
-        summary[MODES] = [dict(mode.numbers) for mode in outcome.modes]
+        summary["modes"] = [dict(mode.numbers) for mode in outcome.modes]
     return summary
 
 
 def _curve_summary(curve: Curves) -> dict[str, Any]:
     summary = dict(curve.numbers)
     if curve.bifurcations:
-        summary[BIFURCATIONS] = [dict(found) for found in curve.bifurcations]
+        summary["bifurcations"] = [dict(found) for found in curve.bifurcations]
     return summary
 
 
 def _response_summary(amount: ExcitationSize, response: Response) -> dict[str, Any]:
     summary = {amount.name: response.force, **response.numbers}
     if response.bifurcations:
-        summary[BIFURCATIONS] = [dict(found) for found in response.bifurcations]
+        summary["bifurcations"] = [dict(found) for found in response.bifurcations]
     if response.loops:
-        summary[LOOPS] = [dict(loop.numbers) for loop in response.loops]
+        summary["loops"] = [dict(loop.numbers) for loop in response.loops]
     if response.answers is not None:
-        summary[AT] = [dict(numbers) for numbers in response.answers.numbers]
+        summary["at"] = [dict(numbers) for numbers in response.answers.numbers]
     return summary
 
 
