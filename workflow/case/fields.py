@@ -12,6 +12,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path as Pathname
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -257,6 +258,24 @@ class ScalarOrList:
         listed = handler(schema)
         alone = listed["prefixItems"][0] if "prefixItems" in listed else listed["items"]
         return {"anyOf": [alone, listed]}
+
+
+@dataclass(frozen=True)
+class Ascending:
+    """Annotation of a list of numbers that ascend; messages say that ``allowed`` ones do."""
+
+    allowed: str
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self._checked, handler(source))
+
+    def _checked(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
+        if any(after <= before for before, after in pairwise(numbers)):
+            message = f"not ascending; allowed: {self.allowed}"
+            raise PydanticCustomError("entry", "{message}", {"message": message})
+        return numbers
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from pydantic import model_validator
 
 from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
 from workflow.case.fields import File, Quantity, Whole
-from workflow.case.files.input_files import InputFileError
 from workflow.case.files.table_file import read_columns
 from workflow.case.sections import (
     Section,
+    at_entry,
     disagreement,
     entry,
     one_of,
@@ -121,10 +121,8 @@ class LegsOrFile(Section, Generic[LegT]):
             raise disagreement(
                 f"{problem}; allowed: either legs or file", "file" if self.legs else "legs"
             )
-        try:
+        with at_entry("file"):
             places = dict.fromkeys(self.table().columns, "file")
-        except InputFileError as error:
-            raise disagreement(str(error), "file") from error
         for number, leg in reversed(list(enumerate(self.legs))):
             given = [key for key in places if getattr(leg, key) is not None]
             places |= {key: f"legs.{number}.{key}" for key in given}

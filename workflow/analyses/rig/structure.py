@@ -20,9 +20,9 @@ from workflow.analyses.rig.joint_sections import (
 from workflow.analyses.rig.places import Against, Direction, KeptPoints, Moved
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.case.fields import Quantity, Whole, shown
-from workflow.case.files.input_files import InputFileError, open_hdf5
+from workflow.case.files.input_files import open_hdf5
 from workflow.case.loading import YAML, CaseFile, outline_of
-from workflow.case.sections import Length, Section, Title, disagreement, entry
+from workflow.case.sections import Length, Section, Title, at_entry, disagreement, entry
 from workflow.case.text.plain import entries
 from workflow.models.rig.names import MODE
 
@@ -269,10 +269,8 @@ class ReducedBody(JointedBody, StoredBody):
     @model_validator(mode="after")
     def _file_is_a_model(self) -> ReducedBody:
         if self.body is None:
-            try:
+            with at_entry("file"):
                 self.stored()
-            except InputFileError as error:
-                raise disagreement(str(error), "file") from error
         return self
 
     def stored(self) -> ReducedModel:

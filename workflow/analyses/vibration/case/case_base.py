@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
 from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -12,7 +11,7 @@ from pydantic import Field, model_validator
 from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.bodies.point_body import PointBody
 from workflow.analyses.rig.bodies.ring import RingOfSectors
-from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
+from workflow.analyses.rig.excitation import DrivingForce, FrequencySpan, MassNumber
 from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
 from workflow.analyses.rig.plausibility import RIGID, about_matrices, about_modes
 from workflow.analyses.rig.structure import (
@@ -26,7 +25,7 @@ from workflow.analyses.rig.structure import (
 )
 from workflow.analyses.vibration.case.excitation import VibrationExcitation
 from workflow.analyses.vibration.case.sections import Continuation, MotionResolution
-from workflow.case.fields import Quantity
+from workflow.case.fields import Ascending, Quantity
 from workflow.case.sections import Case, Title, disagreement, entry, one_of
 from workflow.case.source import Source
 from workflow.case.text.plain import shares
@@ -49,7 +48,14 @@ class VibrationCaseBase(Case):
     structure: RowOfMasses | ReducedBody | MatrixBody | PointBody | FrictionRig = entry(
         "structure that holds the joints"
     )
-    forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] | None = entry(
+    forces: (
+        Annotated[
+            tuple[DrivingForce, ...],
+            Field(min_length=1, max_length=100),
+            Ascending("ascending forces"),
+        ]
+        | None
+    ) = entry(
         "amplitudes of the force, ascending, each followed through the frequencies [N]",
         ["10 N", "40 N"],
         default=None,
@@ -63,19 +69,9 @@ class VibrationCaseBase(Case):
         4,
         default=None,
     )
-    frequencies: tuple[Frequency, Frequency] = entry(
-        "lower and upper end [Hz]", ["20 Hz", "400 Hz"]
-    )
+    frequencies: FrequencySpan = entry("lower and upper end [Hz]", ["20 Hz", "400 Hz"])
     resolution: MotionResolution = entry("resolution of a period", default=MotionResolution())
     continuation: Continuation = entry("continuation of each curve", default=Continuation())
-
-    @model_validator(mode="after")
-    def _ascending(self) -> VibrationCaseBase:
-        if any(after <= before for before, after in pairwise(self.forces or ())):
-            raise disagreement("not ascending; allowed: ascending forces", "forces")
-        if self.frequencies[0] >= self.frequencies[1]:
-            raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
-        return self
 
     @model_validator(mode="after")
     def _wears_its_joint(self) -> VibrationCaseBase:
