@@ -374,14 +374,14 @@ def joint_rows(
     return [(name, f"{law.law}, {entries(law)}") for name, law in every if law is not None]
 
 
-def refuse_own_joints(structure: Section, otherwise: str) -> None:
-    """Refuse laws of individual joints of a body; ``otherwise`` names what is allowed."""
+def refuse_own_joints(structure: Section) -> None:
+    """Refuse laws of individual joints of a body whose contact wears."""
     if not isinstance(structure, JointedBody):
         return
     for number, law in enumerate(own_laws(structure)):
         if law is not None:
             raise disagreement(
-                f"{law.law}: a law of its own; allowed: {otherwise}",
+                f"{law.law}: a law of its own; allowed: the contact that wears alone",
                 f"structure.joints.{number}.joint",
             )
 

@@ -26,7 +26,7 @@ from workflow.analyses.rig.structure import (
 from workflow.analyses.vibration.case.excitation import VibrationExcitation
 from workflow.analyses.vibration.case.sections import Continuation, MotionResolution
 from workflow.case.fields import Ascending, Quantity
-from workflow.case.sections import Case, Title, disagreement, entry, one_of
+from workflow.case.sections import Case, Title, disagreement, entry, in_its_place, one_of
 from workflow.case.source import Source
 from workflow.case.text.plain import shares
 from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
@@ -76,7 +76,7 @@ class VibrationCaseBase(Case):
     @model_validator(mode="after")
     def _wears_its_joint(self) -> VibrationCaseBase:
         if not self.mixes_laws:
-            refuse_own_joints(self.structure, "the contact that wears alone")
+            refuse_own_joints(self.structure)
         return self
 
     @model_validator(mode="after")
@@ -119,11 +119,15 @@ class VibrationCaseBase(Case):
         ring: RingOfSectors | None = None,
     ) -> RigModel | None:
         """Return the rig as far as it is known before a run, and refuse places it does not have."""
-        # Imported here, as it loads the modules that build the structure.
-        from workflow.analyses.vibration.case.places import check_places
+        # Imported here, as they load the modules that build the structure.
+        from workflow.analyses.rig.building import known_rig
+        from workflow.analyses.vibration.case.load import driving_of
 
-        highest, order = self.resolution.harmonics[-1], round(self.engine_order or 1)
-        return check_places(self.structure, self.excitation, highest, joint, mass, ring, order)
+        with in_its_place():
+            rig = known_rig(self.structure, joint, mass, ring, round(self.engine_order or 1))
+            if rig is not None:
+                driving_of(self.excitation, rig, self.resolution.harmonics[-1])
+        return rig
 
     @property
     def amount(self) -> ExcitationSize:

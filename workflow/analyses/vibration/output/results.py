@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import degrees, pi
+from pathlib import Path
 from typing import Any
 
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
@@ -19,15 +20,14 @@ from workflow.analyses.vibration.output.outcome import (
 from workflow.analyses.vibration.stability import bifurcation_arrays
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
-from workflow.layout.declared import Arrays
 from workflow.models.vibration.amount import ExcitationSize
+from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import ResultsWriter, run_results
 from workflow.shell.output.summary import finish
 from workflow.shell.output.tables import DIGITS, heading, write_curves, write_table
 
-TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
 TO_RPM = 30.0 / pi  # rad/s to rpm
 
 
@@ -57,19 +57,18 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
         writer.put("linear", outcome.linear, **limits)
         writer.put("names", outcome.names)
         if outcome.diameters is not None:
-            writer.put("nodal_diameters", outcome.diameters, **outcome.numbers["ring"])
-            path = folder.reserve(
-                "nodal_diameters.csv", "natural frequencies, over nodal diameters"
-            )
-            write_curves(path, outcome.diameters, layout.datasets("nodal_diameters"))
+            what = "natural frequencies, over nodal diameters"
+            path = folder.reserve("nodal_diameters.csv", what)
+            ring = outcome.numbers["ring"]
+            writer.put_table(path, "nodal_diameters", outcome.diameters, **ring)
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
             _put_response(writer, number, outcome, response, folder)
         for place, name, what, curve in _curves(outcome):
-            writer.put(place, curve.arrays, **curve.numbers)
+            path = folder.reserve(f"{name}.csv", what)
+            writer.put_table(path, place, curve.arrays, **curve.numbers)
             _put_bifurcations(writer, place, curve.bifurcations, case.amount)
-            write_curves(folder.reserve(f"{name}.csv", what), curve.arrays, layout.datasets(place))
     if found := list(_every_bifurcation(outcome)):
         path = folder.reserve("bifurcations.csv", "where the stability of motions changes")
         columns: dict[str, list[Any]] = {
@@ -109,33 +108,32 @@ def _put_response(
     amount, place = outcome.case.amount, f"responses/{number:05d}"
     under, layout = amount.under(response.force), layout_of(amount)
 
-    def write_csv(name: str, what: str, curves: Arrays, *groups: str) -> None:
-        path = folder.reserve(f"{name}_{number:05d}.csv", what)
-        declared = {k: v for group in groups for k, v in layout.datasets(group).items()}
-        write_curves(path, curves, declared)
+    def table(name: str, what: str) -> Path:
+        return folder.reserve(f"{name}_{number:05d}.csv", what)
 
-    put_response_curves(writer, place, amount, response)
-    write_csv("frf", f"response {under}, over frequency", response.curves, place)
+    path = table("frf", f"response {under}, over frequency")
+    put_response_curves(writer, path, place, amount, response)
     nodes = f"{place}/nodes"
     writer.put(nodes, response.nodes)
-    frequency = {"frequency": response.curves["frequency"]}
-    what = f"what each joint does {under}"
-    write_csv("joints", what, {**frequency, **response.nodes}, place, nodes)
+    write_curves(
+        table("joints", f"what each joint does {under}"),
+        {"frequency": response.curves["frequency"], **response.nodes},
+        {**layout.datasets(place), **layout.datasets(nodes)},
+    )
     if response.resonance is not None:
         writer.put(f"{place}/resonance", response.resonance)
     for count, loop in enumerate(response.loops):
         writer.put(f"{place}/loops/{count:05d}", loop.arrays, **loop.numbers)
     for loop in response.loops[-1:]:
-        write_csv("loop", f"loop of the joints {under}", loop.arrays, f"{place}/loops/-")
+        path = table("loop", f"loop of the joints {under}")
+        write_curves(path, loop.arrays, layout.datasets(f"{place}/loops/-"))
     if response.answers is not None:
-        answers = response.answers.arrays
-        writer.put(f"{place}/at", answers)
-        write_csv("at", f"motions {under}, as requested", answers, f"{place}/at")
+        path = table("at", f"motions {under}, as requested")
+        writer.put_table(path, f"{place}/at", response.answers.arrays)
     for of, arrays in response.harmonics.items():
         writer.put(f"{place}/harmonics/{of}", arrays)
     what = f"harmonics of places and joints {under}, at resonance and as requested"
-    path = folder.reserve(f"harmonics_{number:05d}.csv", what)
-    write_harmonics(path, outcome.names, response)
+    write_harmonics(table("harmonics", what), outcome.names, response)
     _put_bifurcations(writer, place, response.bifurcations, amount)
 
 
@@ -150,11 +148,11 @@ def _put_bifurcations(
 
 
 def put_response_curves(
-    writer: ResultsWriter, place: str, amount: ExcitationSize, response: Response
+    writer: ResultsWriter, path: Path, place: str, amount: ExcitationSize, response: Response
 ) -> None:
-    """Write the curves of a response and its numbers."""
+    """Write the curves of a response, to the results and as a table, and its numbers."""
     numbers = {amount.name: response.force, **response.numbers}
-    writer.put(place, response.curves, **numbers)
+    writer.put_table(path, place, response.curves, **numbers)
 
 
 def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping[str, Any]]]:

@@ -22,18 +22,17 @@ from workflow.analyses.vibration_wear.output.outcome import (
 )
 from workflow.layout.declared import Arrays, Layout
 from workflow.models.vibration.amount import ExcitationSize
+from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish
-from workflow.shell.output.tables import DIGITS, heading, write_curves, write_table
+from workflow.shell.output.tables import DIGITS, heading, write_table
 
 VibrationWearRun = Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]
 
 # Quantities whose trend is reported, in addition to the resonance under the least force.
 TRENDS = ("stiffness", "peak_pressure", "touching")
-# N mm to J, N/mm to N/µm, mm to µm.
-TO_JOULES, PER_MICRON, TO_MICRONS = 1e-3, 1e-3, 1e3
 
 
 def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
@@ -75,10 +74,8 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
             writer.put_grid("grid", outcome.grid)
         if outcome.nodes is not None:
             writer.put("places", {**outcome.nodes.arrays, **_named(outcome.nodes)})
-        evolution = _evolution(outcome, layout)
-        writer.put("evolution", evolution)
         path = folder.reserve("evolution.csv", "contact and resonances, over the cycles")
-        write_curves(path, evolution, layout.datasets("evolution"))
+        writer.put_table(path, "evolution", _evolution(outcome, layout))
         for number, state in enumerate(outcome.states):
             place = f"worn/{number:05d}"
             writer.put(place, {}, **state.numbers)
@@ -86,11 +83,10 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
                 writer.put(f"{place}/{group}", arrays)
             for force, response in enumerate(state.responses):
                 where = f"{place}/responses/{force:05d}"
-                put_response_curves(writer, where, case.amount, response)
                 under = f"{case.amount.under(response.force)} after {state.cycles:g} cycles"
                 what = f"response {under}, over frequency"
                 path = folder.reserve(f"frf_{number:05d}_{force:05d}.csv", what)
-                write_curves(path, response.curves, layout.datasets(where))
+                put_response_curves(writer, path, where, case.amount, response)
             if outcome.nodes is not None:
                 _write_nodes(outcome.nodes, number, state, folder, layout)
 
