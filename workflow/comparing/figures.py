@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.case.text.readable import suited
 from workflow.case.text.typeset import minus
 from workflow.comparing.compared import ComparedRuns
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
 from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.curves import Curve, curves_in
+from workflow.shell.output.curves import Curve, curves_in, largest, suited_units
+from workflow.shell.output.tables import heading
 
 INCHES = 7.0, 4.6
 COLOURS = BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK
@@ -56,10 +56,7 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
     figure = Figure(figsize=INCHES, layout="constrained")
     axis = figure.subplots()
     first = next(iter(curves.values()))
-    (x_unit, x_size), (y_unit, y_size) = (
-        suited(max(_largest(getattr(c, axis_name)) for c in curves.values()), unit)
-        for axis_name, unit in (("x", first.x_unit), ("y", first.y_unit))
-    )
+    (x_unit, x_size), (y_unit, y_size) = suited_units(curves.values())
     for number, (name, curve) in enumerate(curves.items()):
         many = len(curves) > len(COLOURS)
         look = STYLES[number // len(COLOURS) if many else number % len(STYLES)]
@@ -78,8 +75,8 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
         if line.get_scale() == "linear":
             line.set_major_formatter(lambda number, _: minus(f"{number:,.6g}"))
     axis.set_title(title)
-    axis.set_xlabel(_label(first.x_name, x_unit))
-    axis.set_ylabel(_label(first.y_name, y_unit))
+    axis.set_xlabel(heading(first.x_name, x_unit))
+    axis.set_ylabel(heading(first.y_name, y_unit))
     axis.legend()
     return figure
 
@@ -89,19 +86,10 @@ def _much_smaller(values: Sequence[Array]) -> bool:
 
     A logarithmic axis is possible only if no value is negative.
     """
-    reached = [_largest(those) for those in values]
+    reached = [largest(those) for those in values]
     seen = min(reached) * MUCH_SMALLER >= max(reached) or min(reached) == 0.0
     return not seen and all(np.nanmin(those) >= 0.0 for those in values)
 
 
 def _units(curve: Curve) -> tuple[str, str]:
     return curve.x_unit, curve.y_unit
-
-
-def _largest(values: np.ndarray) -> float:
-    finite = np.abs(values[np.isfinite(values)])
-    return float(finite.max()) if finite.size else 0.0
-
-
-def _label(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name

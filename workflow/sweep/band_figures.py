@@ -15,12 +15,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.case.text.readable import suited
 from workflow.pictures.panels import legend_below, new_figure, panel_grid
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.shell.analysis import Analysis
 from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.curves import Curve, curves_in
+from workflow.shell.output.curves import Curve, curves_in, suited_units
+from workflow.shell.output.tables import heading
 from workflow.sweep.bands import FEWEST, Piece, curve_band, quantiles
 from workflow.sweep.first_order import sides
 from workflow.sweep.table import SweepRow
@@ -107,8 +107,7 @@ def _draw(title: str, way: Way, panels: Curves) -> Figure:
 
 def _draw_panel(axis: Axes, way: Way, name: str, curves: Sequence[Curve]) -> None:
     first = curves[0]
-    x_unit, x_size = suited(max(_largest(curve.x) for curve in curves), first.x_unit)
-    y_unit, y_size = suited(max(_largest(curve.y) for curve in curves), first.y_unit)
+    (x_unit, x_size), (y_unit, y_size) = suited_units(curves)
     shown = [(curve.x / x_size, curve.y / y_size) for curve in curves]
     if pieces := curve_band(shown, way.fewest, way.sides):
         _draw_band(axis, way, pieces)
@@ -121,8 +120,8 @@ def _draw_panel(axis: Axes, way: Way, name: str, curves: Sequence[Curve]) -> Non
         )
     if first.logarithmic:
         axis.set_yscale("log", nonpositive="mask")
-    axis.set_xlabel(_label(first.x_name, x_unit))
-    axis.set_ylabel(_label(first.y_name, y_unit))
+    axis.set_xlabel(heading(first.x_name, x_unit))
+    axis.set_ylabel(heading(first.y_name, y_unit))
 
 
 def _draw_band(axis: Axes, way: Way, pieces: Sequence[Piece]) -> None:
@@ -131,12 +130,3 @@ def _draw_band(axis: Axes, way: Way, pieces: Sequence[Piece]) -> None:
         labels = (None, None) if number else (way.band, way.middle)
         axis.fill_between(piece.places, piece.lower, piece.upper, label=labels[0], **look)
         axis.plot(piece.places, piece.median, color=ORANGE, label=labels[1])
-
-
-def _largest(values: Array) -> float:
-    finite = np.abs(values[np.isfinite(values)])
-    return float(finite.max()) if finite.size else 0.0
-
-
-def _label(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name

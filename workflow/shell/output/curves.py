@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import h5py
 import numpy as np
 
 from sa_solver.types import Array
+from workflow.case.text.readable import suited
 from workflow.errors import UserError
 from workflow.shell.output.quantities import ANY, LAST, CurvesOf
 
@@ -32,6 +33,21 @@ class Curve:
     x_unit: str
     y_unit: str
     logarithmic: bool
+
+
+def largest(*values: Array) -> float:
+    """Return the largest size of the finite values, 0 if there are none."""
+    finite = np.abs(np.concatenate([some[np.isfinite(some)] for some in values]))
+    return float(finite.max(initial=0.0))
+
+
+def suited_units(curves: Collection[Curve]) -> tuple[tuple[str, float], tuple[str, float]]:
+    """Return name and size of the units in which to draw curves of equal units: of x and of y."""
+    first = next(iter(curves))
+    return (
+        suited(largest(*(curve.x for curve in curves)), first.x_unit),
+        suited(largest(*(curve.y for curve in curves)), first.y_unit),
+    )
 
 
 def curves_in(file: h5py.File, wanted: CurvesOf) -> Iterator[Curve]:
