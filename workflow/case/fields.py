@@ -20,6 +20,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from workflow.case import units
+from workflow.errors import UserError
 
 # Files that hold several arrays, with the name of one array after a colon.
 OF_SEVERAL = r"(.*\.(?:h5|hdf5|npz|mat|op4|pch|bdf)):(.*)"
@@ -173,6 +174,18 @@ class Quantity(Entry):
         number = {"type": "number", **finite}
         pattern = units.ABOVE_ZERO_WITH_UNIT if self.above >= 0.0 else units.WITH_UNIT
         return {"anyOf": [number, {"type": "string", "pattern": pattern}]}
+
+
+def quantity_of_option(text: str, quantity: Quantity, option: str) -> float:
+    """Return the text after an option of a command, with or without a unit, as a number.
+
+    Raises UserError, which names the option.
+    """
+    value = float(text) if text.replace(".", "", 1).isdecimal() else text
+    try:
+        return quantity.parse(value)
+    except PydanticCustomError as error:
+        raise UserError(f"{option} {error.message()}") from error
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE
-from rich.console import Console
 from rich.table import Column, Table
 
 from workflow.chart.frontier import Combination, cheapest
@@ -16,6 +15,7 @@ from workflow.chart.run import KIND, Chart
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.versions import versions
 from workflow.shell.output.tables import write_table
+from workflow.shell.terminal.screen import tables_console
 
 # Width in columns of tables that go to a file.
 FILE_WIDTH = 120
@@ -107,9 +107,7 @@ def percent(share: float) -> str:
 
 def show(chart: Chart) -> None:
     """Print tables and sentences on the terminal."""
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console.width = FILE_WIDTH
+    console = tables_console(FILE_WIDTH)
     for ladder in chart.ladders:
         console.print(_table(ladder))
         for name, error in ladder.failed.items():

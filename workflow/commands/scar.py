@@ -51,7 +51,7 @@ def _read(path: Path, bare: tuple[str, str, str] | None) -> Scan:
     try:
         return read_scan(str(path), unit, (pitch[0], pitch[1]) if pitch else None)
     except InputFileError as error:
-        beside = " (--bare UNIT DX DY)" if "beside the file" in str(error) else ""
+        beside = " (--bare UNIT DX DY)" if "with the file" in str(error) else ""
         raise UserError(f"{error}{beside}") from error
 
 

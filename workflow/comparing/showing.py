@@ -31,6 +31,7 @@ from workflow.report.page import (
     table,
 )
 from workflow.shell.output.tables import write_table
+from workflow.shell.terminal.screen import tables_console
 
 # Mark of a difference that exceeds both estimated errors.
 BEYOND = "!"
@@ -46,10 +47,7 @@ FILE_WIDTH = 140
 
 def show(comparison: ComparedRuns) -> None:
     """Print the differences of the cases and all quantities on the terminal."""
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console.width = FILE_WIDTH
-    _print(comparison, console)
+    _print(comparison, tables_console(FILE_WIDTH))
 
 
 def text_of(comparison: ComparedRuns) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from workflow.case.text.plain import counted
+from workflow.case.text.plain import aligned, counted
 from workflow.case.text.readable import percent
 from workflow.fit.fitting import Fitted, Parameter
 from workflow.fit.section import entries_of, reported
@@ -19,20 +19,14 @@ from workflow.shell.output.tables import heading
 CLOSE = 0.9
 # Share of a series in a parameter below which it is not printed.
 LITTLE = 0.005
-GAP = "  "
 HEADINGS = ("parameter", "value", "+-", "95 % bounds", "decided by")
 
 
 def report(fitted: Fitted) -> list[str]:
     """Return the table of parameters, followed by notes."""
     rows = [HEADINGS, *(_row(fitted, parameter) for parameter in fitted.parameters)]
-    material_rows = [row for row in rows if len(row) > 1]
-    widths = [max(len(row[k]) for row in material_rows) for k in range(len(HEADINGS))]
-    lines = [
-        GAP.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-    return [fitted.given.file.title, *lines, *_series(fitted), *_tests(fitted), *_notes(fitted)]
+    title = fitted.given.file.title
+    return [title, *aligned(rows), *_series(fitted), *_tests(fitted), *_notes(fitted)]
 
 
 def _row(fitted: Fitted, parameter: Parameter) -> tuple[str, ...]:

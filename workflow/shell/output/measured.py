@@ -325,18 +325,11 @@ def _headings(entry: Measured, table: TableFile) -> list[str]:
     return [name for name in _called(entry) if name in table.names]
 
 
-def _numbers(table: TableFile, name: str, base: str) -> Array:
+def _with_unit(table: TableFile, name: str, base: str) -> Array:
+    if base not in ("", "1"):
+        table.require_unit(name, base)
     above = 0.0 if name.endswith(OF_DEVIATIONS) else -np.inf
     return table.column(name, Quantity(base or table.unit(name) or "1", above=above))
-
-
-def _with_unit(table: TableFile, name: str, base: str) -> Array:
-    if base not in ("", "1") and not table.unit(name):
-        raise InputFileError(
-            f"{table.place}: {shown(name)}: no unit; allowed: one in brackets, such as "
-            f"{name} [{base}]"
-        )
-    return _numbers(table, name, base)
 
 
 def _listed(key: str, numbers: Sequence[float], base: str) -> Array:
