@@ -326,6 +326,8 @@ FIRST = (
     *("accuracy", "error_budget", "fidelity", "loops", "stress"),
 )
 LAST = ("output", "assumed", "reported", "measured", "expect")
+# Entries on which no computed number depends.
+ASIDE = ("title", *LAST)
 
 
 class Case(Section, ABC):
