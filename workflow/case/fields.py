@@ -11,6 +11,7 @@ import os
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path as Pathname
@@ -181,7 +182,9 @@ def quantity_of_option(text: str, quantity: Quantity, option: str) -> float:
 
     Raises UserError, which names the option.
     """
-    value = float(text) if text.replace(".", "", 1).isdecimal() else text
+    value: float | str = text
+    with suppress(ValueError):
+        value = float(text)
     try:
         return quantity.parse(value)
     except PydanticCustomError as error:

@@ -157,17 +157,17 @@ def put_response_curves(
 
 def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield all bifurcations, each with the name of the curve that it is on."""
-    for response in outcome.responses:
-        yield from (
-            (outcome.case.amount.as_text(response.force), found) for found in response.bifurcations
-        )
-    for number, branch in enumerate(outcome.further):
-        yield from ((f"further branch {number}", found) for found in branch.bifurcations)
-    if outcome.backbone is not None:
-        yield from (("backbone", found) for found in outcome.backbone.bifurcations)
-    for sweep in outcome.force_sweeps:
-        at = f"{sweep.numbers['frequency']:g} Hz"
-        yield from ((at, found) for found in sweep.bifurcations)
+    named: list[tuple[str, Response | Curves]] = [
+        *(
+            (outcome.case.amount.as_text(response.force), response)
+            for response in outcome.responses
+        ),
+        *((f"further branch {number}", curve) for number, curve in enumerate(outcome.further)),
+        *([] if outcome.backbone is None else [("backbone", outcome.backbone)]),
+        *((f"{sweep.numbers['frequency']:g} Hz", sweep) for sweep in outcome.force_sweeps),
+    ]
+    for name, curve in named:
+        yield from ((name, found) for found in curve.bifurcations)
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -193,7 +193,7 @@ def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
     return summary
 
 
-def _curve_summary(curve: Curves) -> dict[str, Any]:
+def _curve_summary(curve: Curves | Response) -> dict[str, Any]:
     summary = dict(curve.numbers)
     if curve.bifurcations:
         summary["bifurcations"] = [dict(found) for found in curve.bifurcations]
@@ -201,9 +201,7 @@ def _curve_summary(curve: Curves) -> dict[str, Any]:
 
 
 def _response_summary(amount: ExcitationSize, response: Response) -> dict[str, Any]:
-    summary = {amount.name: response.force, **response.numbers}
-    if response.bifurcations:
-        summary["bifurcations"] = [dict(found) for found in response.bifurcations]
+    summary = {amount.name: response.force, **_curve_summary(response)}
     if response.loops:
         summary["loops"] = [dict(loop.numbers) for loop in response.loops]
     if response.answers is not None:
