@@ -144,11 +144,6 @@ def legend_of_colours(figure: Figure, colours: Mapping[str, Any]) -> None:
     )
 
 
-def legend_on_the_right(axis: Axes, title: str | None = None) -> None:
-    """Draw a legend to the right of the panel."""
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=title)
-
-
 def legend_below(
     figure: Any,
     axes: Iterable[Axes],

@@ -108,7 +108,7 @@ def frequency_response(file: h5py.File, contents: VibrationContents) -> Figure:
         draw_motions(
             axis, response, response["frequency"][()], size / force, color=colour, label=label
         )
-        mark_bifurcations(axis, response, "frequency", TO_MICRONS / force, colour)
+        mark_bifurcations(axis, response, TO_MICRONS / force, colour)
         _draw_phase(phase, response, color=colour)
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
         lows.append(size.min() / force)
@@ -158,7 +158,7 @@ def _draw_further(
         factor, colour = TO_MICRONS / (1.0 if phase is None else force), colours[force]
         size = factor * branch["amplitude"][:, -1]
         draw_motions(axis, branch, branch["frequency"][()], size, color=colour, linewidth=1.4)
-        mark_bifurcations(axis, branch, "frequency", factor, colour)
+        mark_bifurcations(axis, branch, factor, colour)
         if phase is not None:
             _draw_phase(phase, branch, color=colour, linewidth=1.4)
     return branches
@@ -215,7 +215,7 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: VibrationContents) -
         size = TO_MICRONS * response["amplitude"][:, -1]
         look = {"color": colour, "label": load_text(response.attrs), "linewidth": 1.4}
         draw_motions(axis, response, response["frequency"][()], size, **look)
-        mark_bifurcations(axis, response, "frequency", TO_MICRONS, colour)
+        mark_bifurcations(axis, response, TO_MICRONS, colour)
     drawn = [response for response, _ in _shown(file, contents)]
     drawn += _draw_further(axis, file, contents)
     _over_frequency(axis, file)
@@ -224,7 +224,7 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: VibrationContents) -
         look = {"color": BLACK, "label": "phase resonance", "zorder": 4, "linewidth": 1.0}
         size = TO_MICRONS * backbone["amplitude"][()]
         draw_motions(axis, backbone, backbone["frequency"][()], size, **look)
-        mark_bifurcations(axis, backbone, "frequency", TO_MICRONS, BLACK)
+        mark_bifurcations(axis, backbone, TO_MICRONS, BLACK)
         drawn.append(backbone)
     explain_stability(axis, drawn)
     axis.set_ylabel(f"amplitude of {_seen(file)} [µm]")

@@ -51,15 +51,14 @@ def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
     return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def mark_bifurcations(axis: Axes, group: h5py.Group, x: str, factor: float, colour: Any) -> None:
-    """Mark bifurcations on the curve of a group, over ``x``: the amplitude times a factor."""
+def mark_bifurcations(axis: Axes, group: h5py.Group, factor: float, colour: Any) -> None:
+    """Mark bifurcations on the curve of a group, over the frequency: amplitudes times a factor."""
     if "bifurcations" not in group:
         return
     found = group["bifurcations"]
-    for kind, at, amplitude in zip(
-        found.attrs["kind"], found[x][()], found["amplitude"][()], strict=True
-    ):
-        axis.plot(at, factor * amplitude, MARKS[kind][0], color=colour, **MARK)
+    places = zip(found["frequency"][()], factor * found["amplitude"][()], strict=True)
+    for kind, place in zip(found.attrs["kind"], places, strict=True):
+        axis.plot(*place, MARKS[kind][0], color=colour, **MARK)
 
 
 def explain_stability(axis: Axes, groups: list[h5py.Group]) -> None:

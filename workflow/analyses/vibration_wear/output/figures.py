@@ -19,7 +19,6 @@ from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
 from workflow.pictures.panels import (
     Figures,
     legend_below,
-    legend_on_the_right,
     new_figure,
     plain_ticks,
     shaded,
@@ -102,7 +101,7 @@ def frequency_response(file: h5py.File) -> Figure:
         explain_stability(axis, responses)
         over = f"amplitude / {amount.name} [{amount.receptance[1]}]"
         axis.set(title=amount.as_text(forces[place]), ylabel=over, yscale="log")
-        legend_on_the_right(axis, "cycles: resonance")
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles: resonance")
     panels[-1].set(xlabel="frequency [Hz]", xscale="log")
     for side in (panels[-1].xaxis, *(axis.yaxis for axis in panels)):
         plain_ticks(side)
