@@ -14,6 +14,7 @@ from workflow.chart.ladder import Ladder, Point
 from workflow.chart.run import KIND, Chart
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.versions import versions
+from workflow.shell.output.summary import finite
 from workflow.shell.output.tables import write_table
 from workflow.shell.terminal.screen import tables_console
 
@@ -202,9 +203,9 @@ def _axis_summary(ladder: Ladder, chart: Chart) -> dict[str, Any]:
     chosen = ladder.cheapest(chart.accuracy)
     return {
         "converges": ladder.axis.order is not None,
-        "floor": _finite(ladder.floor),
+        "floor": finite(ladder.floor),
         "references": {
-            quantity: {**vars(reference), "floor": _finite(reference.floor)}
+            quantity: {**vars(reference), "floor": finite(reference.floor)}
             for quantity, reference in ladder.references.items()
         },
         "rungs": [_rung_summary(rung) for rung in ladder.rungs],
@@ -222,15 +223,10 @@ def _rung_summary(rung: Point) -> dict[str, Any]:
         "folder": f"runs/{rung.folder}",
         "values": dict(rung.values),
         "extras": dict(rung.extras),
-        "error": _finite(rung.error),
+        "error": finite(rung.error),
         "worst": rung.worst,
-        "bound": _finite(rung.bound),
+        "bound": finite(rung.bound),
         "unresolved": rung.unresolved,
         "efficient": {"seconds": rung.by_seconds, "convolutions": rung.by_convolutions},
         "cost": vars(rung.cost),
     }
-
-
-def _finite(value: float) -> float | None:
-    """Return a finite value, or None, because JSON has no infinity."""
-    return value if isfinite(value) else None
