@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
-import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -13,8 +12,7 @@ from sa_solver.types import Array
 from workflow.case.text.typeset import minus
 from workflow.comparing.compared import ComparedRuns
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
-from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.curves import Curve, curves_in, largest, suited_units
+from workflow.shell.output.curves import Curve, curves_of_run, largest, suited_units
 from workflow.shell.output.tables import heading
 
 INCHES = 7.0, 4.6
@@ -36,10 +34,8 @@ def figures_of(comparison: ComparedRuns) -> dict[str, Callable[[], Figure]]:
     """
     shared: Curves = {}
     for run in comparison.runs[:MOST]:
-        with h5py.File(OutputFolder(run.folder).results) as file:
-            for wanted in comparison.analysis.curves:
-                for curve in curves_in(file, wanted):
-                    shared.setdefault(curve.title, {})[run.name] = curve
+        for curve in curves_of_run(run.folder, comparison.analysis.curves):
+            shared.setdefault(curve.title, {})[run.name] = curve
     alike = {title: _alike(curves) for title, curves in shared.items()}
     return {
         title: partial(_draw, title, curves) for title, curves in alike.items() if len(curves) > 1

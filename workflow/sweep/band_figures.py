@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,8 +17,7 @@ from sa_solver.types import Array
 from workflow.pictures.panels import legend_below, new_figure, panel_grid
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.shell.analysis import Analysis
-from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.curves import Curve, curves_in, suited_units
+from workflow.shell.output.curves import Curve, curves_of_run, suited_units
 from workflow.shell.output.tables import heading
 from workflow.sweep.bands import FEWEST, Piece, curve_band, quantiles
 from workflow.sweep.first_order import sides
@@ -76,12 +74,9 @@ def _curves(analysis: Analysis[Any], rows: Sequence[SweepRow]) -> Curves:
     """Return the curves of the finished runs, by title."""
     curves: Curves = {}
     for row in rows:
-        if not row.done:
-            continue
-        with h5py.File(OutputFolder(row.finished.folder).results) as file:
-            for wanted in analysis.curves:
-                for curve in curves_in(file, wanted):
-                    curves.setdefault(curve.title, []).append(curve)
+        if row.done:
+            for curve in curves_of_run(row.finished.folder, analysis.curves):
+                curves.setdefault(curve.title, []).append(curve)
     return curves
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from sa_solver.types import Array
 from workflow.case.text.readable import suited
 from workflow.errors import UserError
+from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.quantities import ANY, LAST, CurvesOf
 
 # Attributes of a numbered group that say in words what its number stands for.
@@ -48,6 +50,12 @@ def suited_units(curves: Collection[Curve]) -> tuple[tuple[str, float], tuple[st
         suited(largest(*(curve.x for curve in curves)), first.x_unit),
         suited(largest(*(curve.y for curve in curves)), first.y_unit),
     )
+
+
+def curves_of_run(folder: Path, wanted: Sequence[CurvesOf]) -> list[Curve]:
+    """Return the curves of these descriptions in the results of a finished run."""
+    with h5py.File(OutputFolder(folder).results) as file:
+        return [curve for each in wanted for curve in curves_in(file, each)]
 
 
 def curves_in(file: h5py.File, wanted: CurvesOf) -> Iterator[Curve]:
