@@ -12,8 +12,7 @@ from sa_solver.types import Array
 from workflow.case.text.typeset import minus
 from workflow.comparing.compared import ComparedRuns
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
-from workflow.shell.output.curves import Curve, curves_of_run, largest, suited_units
-from workflow.shell.output.tables import heading
+from workflow.shell.output.curves import Curve, axis_labels, curves_of_run, largest, suited_units
 
 INCHES = 7.0, 4.6
 COLOURS = BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK
@@ -70,9 +69,7 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
     for line in (axis.xaxis, axis.yaxis):
         if line.get_scale() == "linear":
             line.set_major_formatter(lambda number, _: minus(f"{number:,.6g}"))
-    axis.set_title(title)
-    axis.set_xlabel(heading(first.x_name, x_unit))
-    axis.set_ylabel(heading(first.y_name, y_unit))
+    axis.set(title=title, **axis_labels(first, x_unit, y_unit))
     axis.legend()
     return figure
 

@@ -20,7 +20,7 @@ from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.pictures.style import AMBER, BLACK, BLUE, ORANGE
 from workflow.shell.analysis import Pictures
-from workflow.shell.output.curves import largest
+from workflow.shell.output.curves import axis_labels, largest
 from workflow.shell.output.measured import MeasuredCurve, compare_with_curve
 from workflow.shell.output.quantities import CurvesOf
 from workflow.shell.output.tables import heading
@@ -162,14 +162,12 @@ def _draw_beside(left: Axes, right: Axes, found: MeasuredCurve) -> None:
     left.plot(curve.x / x_unit, curve.y / y_unit, color=BLUE, label="computed")
     _draw_points(left, found, x_unit, y_unit, "o", ORANGE)
     left.set_title(f"{curve.title[:1].upper()}{curve.title[1:]}")
-    left.set_ylabel(heading(curve.y_name, y_name))
+    left.set(**axis_labels(curve, x_name, y_name))
     left.legend()
     off = (found.computed - points.y) / y_unit
     bars = None if points.deviations is None else points.deviations / y_unit
     right.errorbar(points.x / x_unit, off, bars, fmt="o", color=ORANGE, ms=6.0, capsize=3.0)
     right.axhline(0.0, color=BLACK, lw=0.8)
-    right.set_title("Computed minus measured")
+    right.set(title="Computed minus measured", xlabel=left.get_xlabel())
     right.set_ylabel(heading("deviation", y_name))
-    for axis in left, right:
-        axis.set_xlabel(heading(curve.x_name, x_name))
     right.set_xlim(left.get_xlim())

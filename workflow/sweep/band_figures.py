@@ -17,8 +17,7 @@ from sa_solver.types import Array
 from workflow.pictures.panels import legend_below, new_figure, panel_grid
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.shell.analysis import Analysis
-from workflow.shell.output.curves import Curve, curves_of_run, suited_units
-from workflow.shell.output.tables import heading
+from workflow.shell.output.curves import Curve, axis_labels, curves_of_run, suited_units
 from workflow.sweep.bands import FEWEST, Piece, curve_band, quantiles
 from workflow.sweep.first_order import sides
 from workflow.sweep.table import SweepRow
@@ -115,8 +114,7 @@ def _draw_panel(axis: Axes, way: Way, name: str, curves: Sequence[Curve]) -> Non
         )
     if first.logarithmic:
         axis.set_yscale("log", nonpositive="mask")
-    axis.set_xlabel(heading(first.x_name, x_unit))
-    axis.set_ylabel(heading(first.y_name, y_unit))
+    axis.set(**axis_labels(first, x_unit, y_unit))
 
 
 def _draw_band(axis: Axes, way: Way, pieces: Sequence[Piece]) -> None:

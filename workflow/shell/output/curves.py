@@ -14,6 +14,7 @@ from workflow.case.text.readable import suited
 from workflow.errors import UserError
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.quantities import ANY, LAST, CurvesOf
+from workflow.shell.output.tables import heading
 
 # Attributes of a numbered group that say in words what its number stands for.
 TELLING = {
@@ -35,6 +36,11 @@ class Curve:
     x_unit: str
     y_unit: str
     logarithmic: bool
+
+
+def axis_labels(curve: Curve, x_unit: str, y_unit: str) -> dict[str, str]:
+    """Return the labels of the axes of a curve in these units, as settings of matplotlib's axes."""
+    return {"xlabel": heading(curve.x_name, x_unit), "ylabel": heading(curve.y_name, y_unit)}
 
 
 def largest(*values: Array) -> float:
