@@ -35,6 +35,11 @@ if TYPE_CHECKING:
     from workflow.models.rig.rig_model import RigModel
 
 
+Forces = Annotated[
+    tuple[DrivingForce, ...], Field(min_length=1, max_length=100), Ascending("ascending forces")
+]
+
+
 class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
@@ -48,14 +53,7 @@ class VibrationCaseBase(Case):
     structure: RowOfMasses | ReducedBody | MatrixBody | PointBody | FrictionRig = entry(
         "structure that holds the joints"
     )
-    forces: (
-        Annotated[
-            tuple[DrivingForce, ...],
-            Field(min_length=1, max_length=100),
-            Ascending("ascending forces"),
-        ]
-        | None
-    ) = entry(
+    forces: Forces | None = entry(
         "amplitudes of the force, ascending, each followed through the frequencies [N]",
         ["10 N", "40 N"],
         default=None,
