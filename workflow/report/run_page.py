@@ -31,7 +31,7 @@ from workflow.report.page import (
     table,
     unbroken,
 )
-from workflow.shell.output.expectations import Verdict, verdicts
+from workflow.shell.output.expectations import Verdict, verdict_of
 from workflow.shell.output.quantities import SummaryQuantity
 from workflow.shell.output.summary import QuantityError, counted_from_first
 
@@ -138,9 +138,8 @@ def _verdicts(run: ReportData) -> list[Verdict | str]:
     """Return the verdict on each expectation, or the reason why there is no number to compare."""
     found: list[Verdict | str] = []
     for entry in run.case.expect:
-        one = run.case.model_copy(update={"expect": (entry,)})
         try:
-            found += verdicts(one, run.summary)
+            found.append(verdict_of(entry, run.summary))
         except QuantityError as error:
             found.append(str(error))
     return found
