@@ -11,7 +11,9 @@ import os
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path as Pathname
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -19,6 +21,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from workflow.case import units
+from workflow.errors import UserError
 
 # Files that hold several arrays, with the name of one array after a colon.
 OF_SEVERAL = r"(.*\.(?:h5|hdf5|npz|mat|op4|pch|bdf)):(.*)"
@@ -174,6 +177,20 @@ class Quantity(Entry):
         return {"anyOf": [number, {"type": "string", "pattern": pattern}]}
 
 
+def quantity_of_option(text: str, quantity: Quantity, option: str) -> float:
+    """Return the text after an option of a command, with or without a unit, as a number.
+
+    Raises UserError, which names the option.
+    """
+    value: float | str = text
+    with suppress(ValueError):
+        value = float(text)
+    try:
+        return quantity.parse(value)
+    except PydanticCustomError as error:
+        raise UserError(f"{option} {error.message()}") from error
+
+
 @dataclass(frozen=True)
 class Whole(Entry):
     """Whole number from ``at_least`` to ``at_most``."""
@@ -257,6 +274,24 @@ class ScalarOrList:
         listed = handler(schema)
         alone = listed["prefixItems"][0] if "prefixItems" in listed else listed["items"]
         return {"anyOf": [alone, listed]}
+
+
+@dataclass(frozen=True)
+class Ascending:
+    """Annotation of a list of numbers that ascend; messages say that ``allowed`` ones do."""
+
+    allowed: str
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self._checked, handler(source))
+
+    def _checked(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
+        if any(after <= before for before, after in pairwise(numbers)):
+            message = f"not ascending; allowed: {self.allowed}"
+            raise PydanticCustomError("entry", "{message}", {"message": message})
+        return numbers
 
 
 @dataclass(frozen=True)

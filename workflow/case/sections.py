@@ -40,7 +40,7 @@ from workflow.case.fields import (
 )
 from workflow.case.materials import MATERIALS, near
 from workflow.case.source import Source
-from workflow.errors import EntryError
+from workflow.errors import EntryError, UserError
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
 Length = Annotated[float, Quantity("mm", above=0.0, at_most=1e4)]
@@ -84,6 +84,15 @@ def in_its_place() -> Iterator[None]:
         yield
     except EntryError as error:
         raise disagreement(error.message, error.key) from error
+
+
+@contextmanager
+def at_entry(key: str) -> Iterator[None]:
+    """Turn an error about a file into an error at the entry that names the file."""
+    try:
+        yield
+    except UserError as error:
+        raise disagreement(str(error), key) from error
 
 
 def one_of(*keys: str) -> dict[str, Any]:
@@ -317,6 +326,8 @@ FIRST = (
     *("accuracy", "error_budget", "fidelity", "loops", "stress"),
 )
 LAST = ("output", "assumed", "reported", "measured", "expect")
+# Entries on which no computed number depends.
+ASIDE = ("title", *LAST)
 
 
 class Case(Section, ABC):

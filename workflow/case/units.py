@@ -82,19 +82,8 @@ FACTOR_PATTERN = re.compile(r"(?P<unit>[A-Za-z%]+)(?:\^(?P<power>[1-9]))?")
 # Suggested when a unit is not known; pint knows many more.
 COMMON_UNITS = (
     *("mm", "um", "m", "N", "kN", "MPa", "GPa", "Pa", "kg", "g", "t", "s", "h", "J", "mJ"),
-    *(
-        "deg",
-        "rad",
-        "rpm",
-        "rad/s",
-        "%",
-        "kg/m^3",
-        "N*m",
-        "um^3/J",
-        "mm^3/J",
-        "mm^3/(N*m)",
-        "1/MPa",
-    ),
+    *("deg", "rad", "rpm", "rad/s", "%", "kg/m^3", "N*m"),
+    *("um^3/J", "mm^3/J", "mm^3/(N*m)", "1/MPa"),
 )
 
 

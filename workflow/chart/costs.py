@@ -9,22 +9,12 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from workflow.case.sections import Case
+from workflow.case.sections import ASIDE, Case
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.store import read_bytes
 
 # Sections of a case that do not affect the structural stages.
-NOT_STRUCTURAL = {
-    "title",
-    "contact",
-    "wear",
-    "coupling",
-    "stress",
-    "output",
-    "assumed",
-    "measured",
-    "expect",
-}
+NOT_STRUCTURAL = {*ASIDE, "contact", "wear", "coupling", "stress"}
 # Stages whose results are cached for all runs of the same structure, whatever its friction and the
 # increments of its load path. The first result of FRICTION is cached for equal friction and path.
 CONDENSED = ("mesh", "condensation", "reduction")

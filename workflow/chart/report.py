@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE
-from rich.console import Console
 from rich.table import Column, Table
 
 from workflow.chart.frontier import Combination, cheapest
@@ -15,7 +14,9 @@ from workflow.chart.ladder import Ladder, Point
 from workflow.chart.run import KIND, Chart
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.versions import versions
+from workflow.shell.output.summary import finite
 from workflow.shell.output.tables import write_table
+from workflow.shell.terminal.screen import tables_console
 
 # Width in columns of tables that go to a file.
 FILE_WIDTH = 120
@@ -107,9 +108,7 @@ def percent(share: float) -> str:
 
 def show(chart: Chart) -> None:
     """Print tables and sentences on the terminal."""
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console.width = FILE_WIDTH
+    console = tables_console(FILE_WIDTH)
     for ladder in chart.ladders:
         console.print(_table(ladder))
         for name, error in ladder.failed.items():
@@ -204,9 +203,9 @@ def _axis_summary(ladder: Ladder, chart: Chart) -> dict[str, Any]:
     chosen = ladder.cheapest(chart.accuracy)
     return {
         "converges": ladder.axis.order is not None,
-        "floor": _finite(ladder.floor),
+        "floor": finite(ladder.floor),
         "references": {
-            quantity: {**vars(reference), "floor": _finite(reference.floor)}
+            quantity: {**vars(reference), "floor": finite(reference.floor)}
             for quantity, reference in ladder.references.items()
         },
         "rungs": [_rung_summary(rung) for rung in ladder.rungs],
@@ -224,15 +223,10 @@ def _rung_summary(rung: Point) -> dict[str, Any]:
         "folder": f"runs/{rung.folder}",
         "values": dict(rung.values),
         "extras": dict(rung.extras),
-        "error": _finite(rung.error),
+        "error": finite(rung.error),
         "worst": rung.worst,
-        "bound": _finite(rung.bound),
+        "bound": finite(rung.bound),
         "unresolved": rung.unresolved,
         "efficient": {"seconds": rung.by_seconds, "convolutions": rung.by_convolutions},
         "cost": vars(rung.cost),
     }
-
-
-def _finite(value: float) -> float | None:
-    """Return a finite value, or None, because JSON has no infinity."""
-    return value if isfinite(value) else None

@@ -16,8 +16,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import PydanticCustomError
-
 from workflow.analyses.wear.approximations.approximation import (
     Approximation,
     Rung,
@@ -25,7 +23,7 @@ from workflow.analyses.wear.approximations.approximation import (
     overrides_of,
 )
 from workflow.case.changing import changed
-from workflow.case.fields import Quantity
+from workflow.case.fields import Quantity, quantity_of_option
 from workflow.case.sections import Case
 from workflow.chart.axes import Setting, axes_of
 from workflow.chart.costs import RunCost, costs
@@ -78,11 +76,7 @@ class _Run:
 
 def accuracy_of(text: str) -> float:
     """Return a share such as ``1 %`` or ``0.01`` as a number; raise UserError for others."""
-    value = float(text) if text.replace(".", "", 1).isdecimal() else text
-    try:
-        return ACCURACY.parse(value)
-    except PydanticCustomError as error:
-        raise UserError(f"--accuracy {error.message()}") from error
+    return quantity_of_option(text, ACCURACY, "--accuracy")
 
 
 def chart_case(

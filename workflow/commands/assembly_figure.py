@@ -195,8 +195,7 @@ def _fill_plane(axis: Axes, body: DrawnBody, colour: Any) -> None:
     )
     axis.set_aspect("equal")
     axis.autoscale_view()
-    axis.set_xlabel("x [mm]")
-    axis.set_ylabel("z [mm]")
+    axis.set(xlabel="x [mm]", ylabel="z [mm]")
 
 
 def _number_faces(axis: Axes, body: DrawnBody, screen: Array, eye: Array | None) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-
-from pydantic import TypeAdapter, ValidationError
+from typing import get_args
 
 from fe_models.geometry.imported import ImportedMesh, read_bodies
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.length_unit import SIZES
+from workflow.case.fields import quantity_of_option
 from workflow.case.sections import Length
 from workflow.errors import UserError
 from workflow.shell.folders.folder import OutputFolder
@@ -27,8 +27,9 @@ def read_file(file: Path, size: str | None, unit: str | None) -> ImportedMesh:
     """
     if unit is not None and unit not in SIZES:
         raise UserError(f"--unit: {unit!r}; allowed: {', '.join(SIZES)}")
+    length = None if size is None else quantity_of_option(size, get_args(Length)[1], "--size:")
     try:
-        return read_bodies(file, None if size is None else _length(size), unit)
+        return read_bodies(file, length, unit)
     except MeshError as error:
         raise UserError(str(error)) from error
 
@@ -58,12 +59,3 @@ def write_offer(
     with replacing(case) as partial:
         partial.write_text(offer.text, encoding="utf-8")
     return [*(f"not in the case: {line}" for line in offer.ignored), str(case)]
-
-
-def _length(text: str) -> float:
-    """Return a length in mm; raise UserError for other texts."""
-    value = float(text) if text.replace(".", "", 1).isdecimal() else text
-    try:
-        return TypeAdapter(Length).validate_python(value)
-    except ValidationError as error:
-        raise UserError(f"--size: {error.errors()[0]['msg']}") from error

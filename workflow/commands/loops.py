@@ -17,14 +17,15 @@ from wear.joints.measured.measured_loops import (
     measure_loops,
 )
 from workflow.analyses.wear.output.loop_table import write_loop_table
+from workflow.case.fields import Quantity, quantity_of_option
 from workflow.case.files.loop_file import BASE_UNITS, account, read_loop_file
 from workflow.case.text.readable import percent
-from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.lock import locked
 
 TABLE, FIGURE = "loops.csv", "loops.png"
+LOAD = Quantity("N", above=0.0, range_text="a force above 0 such as 60 N")
 # Largest number of cycles that are printed.
 MOST_ROWS = 12
 WIDTH = 14
@@ -64,21 +65,7 @@ def _normal_load(path: Path, column: Array | None, text: str | None) -> Array | 
         return column
     if column is not None:
         raise UserError(f"{path}: has a column of the normal load; allowed: it or --normal-load")
-    try:
-        load = _number(text) or to_base(text, "N")
-    except UnitError as error:
-        raise UserError(f"--normal-load {text}: {error}; allowed: a force such as 60 N") from error
-    if not load > 0.0:
-        raise UserError(f"--normal-load {text}: not above 0; allowed: a force such as 60 N")
-    return load
-
-
-def _number(text: str) -> float | None:
-    """Return a bare number as a float; None for other texts."""
-    try:
-        return float(text)
-    except ValueError:
-        return None
+    return quantity_of_option(text, LOAD, "--normal-load")
 
 
 # --- report -------------------------------------------------------------------------------------

@@ -50,8 +50,7 @@ def _draw_loops(axis: Axes, loops: MeasuredLoops) -> None:
     last = int(loops.step[-1])
     for number in range(0, last + 1, -(-(last + 1) // MOST_STEPS)):
         _draw_step(axis, loops, np.flatnonzero(loops.step == number), number == 0)
-    axis.set_xlabel("displacement [µm]")
-    axis.set_ylabel("force [N]")
+    axis.set(xlabel="displacement [µm]", ylabel="force [N]")
 
 
 def _draw_step(axis: Axes, loops: MeasuredLoops, members: Indices, labelled: bool) -> None:

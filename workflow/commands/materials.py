@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from workflow.case.materials import MATERIALS
+from workflow.case.text.plain import aligned
 
 HEAD = "name", "young", "poisson", "density", "yield", "state"
 
@@ -18,11 +19,7 @@ def known_materials() -> Iterator[str]:
         yields = "-" if known.yield_stress is None else f"{known.yield_stress:g} MPa"
         elastic = f"{known.young:g} GPa", f"{known.poisson:g}", f"{known.density:g} kg/m^3"
         rows.append((name, *elastic, yields, known.state))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(
-            f"{text:<{width}}" for text, width in zip(row, widths, strict=True)
-        ).rstrip()
+    yield from aligned(rows)
     yield ""
     for name, known in MATERIALS.items():
         yield f"{name} ({', '.join(known.also)}): {known.source}"

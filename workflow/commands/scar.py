@@ -10,11 +10,11 @@ from sa_solver.errors import InputError
 from sa_solver.surfaces.scans import Scan
 from sa_solver.types import Mask
 from wear.scar import Scar, measure_scar
+from workflow.case.fields import Quantity, quantity_of_option
 from workflow.case.files.input_files import InputFileError
 from workflow.case.files.scan_files import NEAR, UNITS, read_scan
 from workflow.case.text.plain import plain
 from workflow.case.text.readable import percent
-from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.lock import locked
@@ -22,6 +22,8 @@ from workflow.shell.folders.store import replacing, write_text
 
 TABLE, FIELDS, FIGURE = "scar.csv", "scar.npz", "scar.png"
 TO_MICRONS, PER_MICRON = 1e3, 1e9
+LENGTH = Quantity("mm", range_text="a length such as '4 um'")
+PITCH = Quantity("mm", above=0.0, range_text="a length above 0 such as '4 um'")
 LENGTHS = "lengths from the middle, XMIN,XMAX,YMIN,YMAX such as '-0.3 mm,0.3 mm,-0.2 mm,0.2 mm'"
 
 
@@ -45,22 +47,12 @@ def _read(path: Path, bare: tuple[str, str, str] | None) -> Scan:
     unit, *steps = bare or (None,)
     if unit is not None and unit not in UNITS:
         raise UserError(f"--bare {unit}: no such unit; allowed: {', '.join(UNITS)}")
-    pitch = [_length(f"--bare {step}", step) for step in steps if step is not None]
-    if any(step <= 0.0 for step in pitch):
-        raise UserError("--bare: a pitch that is not above 0; allowed: lengths such as '4 um'")
+    pitch = [quantity_of_option(step, PITCH, "--bare") for step in steps]
     try:
         return read_scan(str(path), unit, (pitch[0], pitch[1]) if pitch else None)
     except InputFileError as error:
-        beside = " (--bare UNIT DX DY)" if "beside the file" in str(error) else ""
+        beside = " (--bare UNIT DX DY)" if "with the file" in str(error) else ""
         raise UserError(f"{error}{beside}") from error
-
-
-def _length(place: str, text: str) -> float:
-    """Return a length [mm]; a bare number is in mm."""
-    try:
-        return to_base(text if any(c.isalpha() for c in text) else f"{text} mm", "mm")
-    except UnitError as error:
-        raise UserError(f"{place}: {error}; allowed: a length such as '4 um'") from error
 
 
 def _rectangle(text: str, scan: Scan) -> Mask:
@@ -68,7 +60,7 @@ def _rectangle(text: str, scan: Scan) -> Mask:
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 4:
         raise UserError(f"--worn {text}: not four; allowed: {LENGTHS}")
-    x_min, x_max, y_min, y_max = (_length(f"--worn {part}", part) for part in parts)
+    x_min, x_max, y_min, y_max = (quantity_of_option(part, LENGTH, "--worn") for part in parts)
     x, y = (
         (np.arange(count) - 0.5 * (count - 1)) * pitch
         for count, pitch in zip(scan.heights.shape, scan.pitch, strict=True)

@@ -37,8 +37,7 @@ def figure(scar: Scar, name: str) -> Figure:
     shown = axis.pcolormesh(x, y, depth.T, cmap=COLOUR_MAP, rasterized=True)
     axis.contour(x, y, scar.worn.T.astype(float), levels=[0.5], colors=[BLACK])
     left.colorbar(shown, ax=axis, label="depth [µm]")
-    axis.set_xlabel("x [mm]")
-    axis.set_ylabel("y [mm]")
+    axis.set(xlabel="x [mm]", ylabel="y [mm]")
     deepest = np.unravel_index(
         np.argmax(np.where(scar.worn, np.nan_to_num(scar.depth), -np.inf)), scar.depth.shape
     )
@@ -57,7 +56,6 @@ def _draw_lines(
         axis.plot(
             along, np.where(worn, TO_MICRONS * depth, np.nan), color=BLUE, lw=1.6, label="worn"
         )
-        axis.set_xlabel(f"{name} [mm]")
-        axis.set_ylabel("depth [µm]")
+        axis.set(xlabel=f"{name} [mm]", ylabel="depth [µm]")
         axis.invert_yaxis()
     legend_below(part, [axes[0]])

@@ -9,18 +9,17 @@ from os.path import commonpath
 from pathlib import Path
 from typing import Any
 
+from workflow.case.sections import ASIDE
 from workflow.case.text.leaves import leaves_of
 from workflow.case.text.readable import suited_unit
 from workflow.errors import UserError
 from workflow.kinds import analysis_of
-from workflow.report.report_data import ReportData
+from workflow.report.run_page import ReportData
 from workflow.report.writing import report_data_of
 from workflow.shell.analysis import Analysis
 from workflow.shell.output.quantities import SummaryQuantity
 from workflow.shell.output.summary import required_number
 
-# Entries of a case that no result depends on.
-NO_MATTER = "title", "output", "assumed", "measured", "expect", "reported"
 NOTHING = "–"
 
 
@@ -152,7 +151,7 @@ def _entries(runs: Sequence[ReportData]) -> dict[str, tuple[str, ...]]:
     paths = dict.fromkeys(path for of_run in leaves for path in of_run)
     entries = {}
     for path in paths:
-        if path.partition(".")[0] in NO_MATTER:
+        if path.partition(".")[0] in ASIDE:
             continue
         found = [of_run.get(path) for of_run in leaves]
         if any(leaf is None or found[0] is None or leaf.value != found[0].value for leaf in found):

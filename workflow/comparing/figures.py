@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
-import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.case.text.readable import suited
 from workflow.case.text.typeset import minus
 from workflow.comparing.compared import ComparedRuns
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
-from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.curves import Curve, curves_in
+from workflow.shell.output.curves import Curve, axis_labels, curves_of_run, largest, suited_units
 
 INCHES = 7.0, 4.6
 COLOURS = BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK
@@ -36,10 +33,8 @@ def figures_of(comparison: ComparedRuns) -> dict[str, Callable[[], Figure]]:
     """
     shared: Curves = {}
     for run in comparison.runs[:MOST]:
-        with h5py.File(OutputFolder(run.folder).results) as file:
-            for wanted in comparison.analysis.curves:
-                for curve in curves_in(file, wanted):
-                    shared.setdefault(curve.title, {})[run.name] = curve
+        for curve in curves_of_run(run.folder, comparison.analysis.curves):
+            shared.setdefault(curve.title, {})[run.name] = curve
     alike = {title: _alike(curves) for title, curves in shared.items()}
     return {
         title: partial(_draw, title, curves) for title, curves in alike.items() if len(curves) > 1
@@ -56,10 +51,7 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
     figure = Figure(figsize=INCHES, layout="constrained")
     axis = figure.subplots()
     first = next(iter(curves.values()))
-    (x_unit, x_size), (y_unit, y_size) = (
-        suited(max(_largest(getattr(c, axis_name)) for c in curves.values()), unit)
-        for axis_name, unit in (("x", first.x_unit), ("y", first.y_unit))
-    )
+    (x_unit, x_size), (y_unit, y_size) = suited_units(curves.values())
     for number, (name, curve) in enumerate(curves.items()):
         many = len(curves) > len(COLOURS)
         look = STYLES[number // len(COLOURS) if many else number % len(STYLES)]
@@ -77,9 +69,7 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
     for line in (axis.xaxis, axis.yaxis):
         if line.get_scale() == "linear":
             line.set_major_formatter(lambda number, _: minus(f"{number:,.6g}"))
-    axis.set_title(title)
-    axis.set_xlabel(_label(first.x_name, x_unit))
-    axis.set_ylabel(_label(first.y_name, y_unit))
+    axis.set(title=title, **axis_labels(first, x_unit, y_unit))
     axis.legend()
     return figure
 
@@ -89,19 +79,10 @@ def _much_smaller(values: Sequence[Array]) -> bool:
 
     A logarithmic axis is possible only if no value is negative.
     """
-    reached = [_largest(those) for those in values]
+    reached = [largest(those) for those in values]
     seen = min(reached) * MUCH_SMALLER >= max(reached) or min(reached) == 0.0
     return not seen and all(np.nanmin(those) >= 0.0 for those in values)
 
 
 def _units(curve: Curve) -> tuple[str, str]:
     return curve.x_unit, curve.y_unit
-
-
-def _largest(values: np.ndarray) -> float:
-    finite = np.abs(values[np.isfinite(values)])
-    return float(finite.max()) if finite.size else 0.0
-
-
-def _label(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name

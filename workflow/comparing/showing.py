@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from io import StringIO
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE
@@ -30,7 +29,7 @@ from workflow.report.page import (
     section,
     table,
 )
-from workflow.shell.output.tables import write_table
+from workflow.shell.terminal.screen import tables_console
 
 # Mark of a difference that exceeds both estimated errors.
 BEYOND = "!"
@@ -46,10 +45,7 @@ FILE_WIDTH = 140
 
 def show(comparison: ComparedRuns) -> None:
     """Print the differences of the cases and all quantities on the terminal."""
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console.width = FILE_WIDTH
-    _print(comparison, console)
+    _print(comparison, tables_console(FILE_WIDTH))
 
 
 def text_of(comparison: ComparedRuns) -> str:
@@ -109,11 +105,6 @@ def _signed(difference: float) -> str:
 
 
 # --- table --------------------------------------------------------------------------------------
-
-
-def write_csv(comparison: ComparedRuns, path: Path) -> None:
-    """Write the table of all quantities."""
-    write_table(path, columns_of(comparison))
 
 
 def columns_of(comparison: ComparedRuns) -> dict[str, list[Any]]:

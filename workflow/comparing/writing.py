@@ -6,10 +6,11 @@ import re
 from pathlib import Path
 
 from workflow.comparing.compared import ComparedRuns
-from workflow.comparing.showing import comparison_page, write_csv
+from workflow.comparing.showing import columns_of, comparison_page
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.lock import locked
 from workflow.shell.folders.store import write_text
+from workflow.shell.output.tables import write_table
 
 TABLE, PAGE, FIGURES = "compare.csv", "compare.html", "curves"
 
@@ -34,7 +35,7 @@ def write_comparison(comparison: ComparedRuns, out: Path, force: bool = False) -
             write_figures(
                 ((name, drawn[title]) for name, title in names.items()), figures, vectors=vectors
             )
-        write_csv(comparison, table)
+        write_table(table, columns_of(comparison))
         pictures = {names[name]: svg for name, svg in vectors.items()}
         write_text(page, comparison_page(comparison, pictures))
     return [table, page]

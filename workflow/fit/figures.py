@@ -15,6 +15,7 @@ from workflow.case.units import to_base
 from workflow.fit.fitting import ENERGY, Fitted, FittedSeries
 from workflow.pictures.panels import legend_below, new_figure, volume_unit
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
+from workflow.shell.output.tables import heading
 
 # Heights of a row of panels, and of title and legend [inches].
 ROW, REST = 3.0, 1.3
@@ -67,7 +68,7 @@ def _draw_data(axis: Axes, fitted: Fitted, series: FittedSeries, here: Array) ->
     else:
         _draw_curve(axis, fitted, series, series.curve, scale)
     called = series.name.replace("_", " ")
-    axis.set_ylabel(f"{called} [{unit}]" if unit != "1" else called)
+    axis.set_ylabel(heading(called, unit))
 
 
 def _draw_curve(
@@ -102,7 +103,7 @@ def _draw_residuals(axis: Axes, series: FittedSeries, residuals: Array) -> None:
 
 
 def _label(axis: Axes, series: FittedSeries) -> None:
-    axis.set_xlabel(f"{series.along.name} [{series.along.unit}]")
+    axis.set_xlabel(heading(series.along.name, series.along.unit))
     energy = series.along.factor * series.column.against
     if _is_wide(series):
         smallest = energy[energy > 0.0].min()
@@ -133,9 +134,9 @@ def _spread(series: FittedSeries) -> Array:
 
 
 def _scale(series: FittedSeries) -> tuple[float, str]:
-    """Return the factor and unit in which values are drawn."""
+    """Return the factor and unit in which values are drawn, "" for no unit."""
     if series.unit == "1":
-        return 1.0, "1"
+        return 1.0, ""
     if series.unit == "mm^3":
         return volume_unit(float(np.abs(series.column.values).max()))
     return 1.0 / to_base(f"1 {series.unit}", None), series.unit.replace("um", "µm")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -70,18 +70,6 @@ class MeasuredColumn:
     left_out: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Part:
-    """Values of one kind from one file, with the fields of :class:`MeasuredColumn`."""
-
-    against: Array
-    values: Array
-    deviations: Array | None
-    others: dict[str, Array]
-    places: list[str]
-    left_out: list[str]
-
-
 def read_columns(
     measurements: Sequence[Measurement],
     names: Sequence[str],
@@ -94,10 +82,11 @@ def read_columns(
     Values were measured ``along`` another column, by which the rows of a file must be sorted if
     ``ascending``. Raises InputFileError, with file and line.
     """
-    parts: dict[str, list[tuple[int, _Part]]] = {}
+    parts: dict[str, list[MeasuredColumn]] = {}
     for number, measurement in enumerate(measurements):
         for name, part in _parts(measurement, names, beside, ascending, along).items():
-            parts.setdefault(name, []).append((number, part))
+            numbered = replace(part, files=np.full(len(part.values), number))
+            parts.setdefault(name, []).append(numbered)
     return {name: _joined(name, parts[name]) for name in names if name in parts}
 
 
@@ -107,7 +96,8 @@ def _parts(
     beside: Sequence[str],
     ascending: bool,
     along: str,
-) -> dict[str, _Part]:
+) -> dict[str, MeasuredColumn]:
+    """Return the columns of one file, which has the number 0."""
     table = read_table_file(measurement.file)
     headings, deviations = _section(measurement, "columns"), _section(measurement, "deviations")
     called = {name: headings.get(name) or name for name in QUANTITIES}
@@ -127,37 +117,33 @@ def _parts(
     if SLIDING in table.names:
         slides = _numbers(table, called, SLIDING) >= SLIDES
         others |= {name: np.where(slides, others[name], 0.0) for name in others if name == RESIDUAL}
-    places = [f"{Path(table.file).name}:{line}" for line, _ in table.rows]
+    places = tuple(f"{Path(table.file).name}:{line}" for line, _ in table.rows)
+    files = np.zeros(len(table), dtype=np.int64)
     parts = {}
     for name in found:
         values = _numbers(table, called, name)
-        part = _Part(
-            against,
-            values,
-            _deviations(table, called, name, deviations.get(name)),
-            others,
-            places,
-            [],
-        )
+        known = _deviations(table, called, name, deviations.get(name))
+        part = MeasuredColumn(against, values, known, others, places, files)
         parts[name] = _of_sliding(table, name, part, slides) if name in OF_SLIDING else part
     return parts
 
 
-def _of_sliding(table: TableFile, name: str, part: _Part, slides: Mask) -> _Part:
+def _of_sliding(table: TableFile, name: str, part: MeasuredColumn, slides: Mask) -> MeasuredColumn:
     """Return the rows of loops that slide as a whole; others mobilise only part of the friction."""
     if not slides.any():
         raise InputFileError(
             f"{table.place}: {name}: no loop slides as a whole (column {SLIDING}), so it is less "
             "than the coefficient of friction; allowed: loops of a larger amplitude"
         )
-    rows = np.flatnonzero(slides)
-    return _Part(
-        part.against[rows],
-        part.values[rows],
-        None if part.deviations is None else part.deviations[rows],
-        {other: values[rows] for other, values in part.others.items()},
-        [part.places[row] for row in rows],
-        [place for place, taken in zip(part.places, slides, strict=True) if not taken],
+    places = np.array(part.places)
+    return MeasuredColumn(
+        part.against[slides],
+        part.values[slides],
+        None if part.deviations is None else part.deviations[slides],
+        {other: values[slides] for other, values in part.others.items()},
+        tuple(places[slides].tolist()),
+        part.files[slides],
+        tuple(places[~slides].tolist()),
     )
 
 
@@ -168,19 +154,15 @@ def _section(measurement: Measurement, name: str) -> dict[str, Any]:
 
 
 def _numbers(table: TableFile, called: Mapping[str, str], name: str) -> Array:
-    heading, quantity = called[name], QUANTITIES[name]
-    _check_unit(table, heading, quantity)
+    return _with_unit(table, called[name], QUANTITIES[name])
+
+
+def _with_unit(table: TableFile, heading: str, quantity: Quantity) -> Array:
+    """Return a column; raise InputFileError if it has a dimension and no unit."""
+    unit = str(quantity.unit)
+    if unit != "1":
+        table.require_unit(heading, {"N*mm": "J", "N/mm": "N/um"}.get(unit, unit))
     return table.column(heading, quantity)
-
-
-def _check_unit(table: TableFile, heading: str, quantity: Quantity) -> None:
-    """Raise InputFileError if a column with a dimension has no unit."""
-    if quantity.unit != "1" and not table.unit(heading):
-        example = {"N*mm": "J", "N/mm": "N/um"}.get(str(quantity.unit), quantity.unit)
-        raise InputFileError(
-            f"{table.place}: {shown(heading)}: no unit; allowed: one in brackets, such as "
-            f"{heading} [{example}]"
-        )
 
 
 def _check_slips(table: TableFile, headings: Sequence[str]) -> None:
@@ -218,30 +200,25 @@ def _deviations(
         raise InputFileError(
             f"{table.place}: {shown(heading)}: given with deviations.{name}; allowed: one of them"
         )
-    unit = QUANTITIES[name].unit
-    quantity = Quantity(unit, above=0.0)
-    _check_unit(table, heading, quantity)
-    return table.column(heading, quantity)
+    return _with_unit(table, heading, Quantity(QUANTITIES[name].unit, above=0.0))
 
 
-def _joined(name: str, parts: Sequence[tuple[int, _Part]]) -> MeasuredColumn:
+def _joined(name: str, parts: Sequence[MeasuredColumn]) -> MeasuredColumn:
     """Return the columns of all files as one."""
-    known = [part.deviations for _, part in parts if part.deviations is not None]
+    known = [part.deviations for part in parts if part.deviations is not None]
     if known and len(known) < len(parts):
-        unknown = next(part for _, part in parts if part.deviations is None)
+        unknown = next(part for part in parts if part.deviations is None)
         raise InputFileError(
             f"{unknown.places[0].rpartition(':')[0]}: {name}: no standard deviations, which other "
             "files have; allowed: deviations of all, or of none"
         )
-    others = set.intersection(*(set(part.others) for _, part in parts))
+    others = set.intersection(*(set(part.others) for part in parts))
     return MeasuredColumn(
-        against=np.concatenate([part.against for _, part in parts]),
-        values=np.concatenate([part.values for _, part in parts]),
+        against=np.concatenate([part.against for part in parts]),
+        values=np.concatenate([part.values for part in parts]),
         deviations=np.concatenate(known) if known else None,
-        others={
-            other: np.concatenate([part.others[other] for _, part in parts]) for other in others
-        },
-        places=tuple(place for _, part in parts for place in part.places),
-        files=np.repeat([number for number, _ in parts], [len(part.values) for _, part in parts]),
-        left_out=tuple(place for _, part in parts for place in part.left_out),
+        others={other: np.concatenate([part.others[other] for part in parts]) for other in others},
+        places=tuple(place for part in parts for place in part.places),
+        files=np.concatenate([part.files for part in parts]),
+        left_out=tuple(place for part in parts for place in part.left_out),
     )

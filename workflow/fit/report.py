@@ -8,31 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from workflow.case.text.plain import counted
+from workflow.case.text.plain import aligned, counted
 from workflow.case.text.readable import percent
 from workflow.fit.fitting import Fitted, Parameter
 from workflow.fit.section import entries_of, reported
 from workflow.shell.folders.versions import versions
+from workflow.shell.output.summary import finite
 from workflow.shell.output.tables import heading
 
 # Smallest correlation that is printed.
 CLOSE = 0.9
 # Share of a series in a parameter below which it is not printed.
 LITTLE = 0.005
-GAP = "  "
 HEADINGS = ("parameter", "value", "+-", "95 % bounds", "decided by")
 
 
 def report(fitted: Fitted) -> list[str]:
     """Return the table of parameters, followed by notes."""
     rows = [HEADINGS, *(_row(fitted, parameter) for parameter in fitted.parameters)]
-    material_rows = [row for row in rows if len(row) > 1]
-    widths = [max(len(row[k]) for row in material_rows) for k in range(len(HEADINGS))]
-    lines = [
-        GAP.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-    return [fitted.given.file.title, *lines, *_series(fitted), *_tests(fitted), *_notes(fitted)]
+    title = fitted.given.file.title
+    return [title, *aligned(rows), *_series(fitted), *_tests(fitted), *_notes(fitted)]
 
 
 def _row(fitted: Fitted, parameter: Parameter) -> tuple[str, ...]:
@@ -129,7 +124,7 @@ def summary(fitted: Fitted, section: str) -> dict[str, Any]:
         },
         "correlation": {
             "parameters": [parameter.path for parameter in fitted.parameters],
-            "matrix": [[_finite(value) for value in row] for row in found.correlation.tolist()],
+            "matrix": [[finite(value) for value in row] for row in found.correlation.tolist()],
         },
         "series": {
             series.name: {
@@ -142,7 +137,7 @@ def summary(fitted: Fitted, section: str) -> dict[str, Any]:
             for place, series in enumerate(fitted.series)
         },
         "tests": {path: _of_tests(fitted, path) for path in fitted.tests},
-        "excess": _finite(found.excess),
+        "excess": finite(found.excess),
         "starts": {"tried": found.tried, "reached": found.reached},
         **({"runs": dict(fitted.runs)} if fitted.runs else {}),
         "doubts": list(fitted.plausibility_warnings),
@@ -177,9 +172,9 @@ def _of_parameter(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
 def _of_tests(fitted: Fitted, path: str) -> dict[str, Any]:
     return {
         "unit": fitted.by_path[path].unit,
-        "chance_to_agree": _finite(fitted.tests[path].chance),
+        "chance_to_agree": finite(fitted.tests[path].chance),
         "files": [
-            {"file": name, "share": round(share, 4), "own": _finite(own), "deviation": _finite(dev)}
+            {"file": name, "share": round(share, 4), "own": finite(own), "deviation": finite(dev)}
             for name, share, own, dev in fitted.shown_tests(path)
         ],
     }
@@ -191,12 +186,8 @@ def _in_a_case(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
     limits = unknown.lower, unknown.upper
     return {
         "entries": entries_of(fitted, parameter.path),
-        "allowed": [_finite(parameter.shown(limit)) for limit in limits],
+        "allowed": [finite(parameter.shown(limit)) for limit in limits],
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def parameter_columns(fitted: Fitted) -> dict[str, Sequence[Any]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from workflow.case.sections import Case
-from workflow.case.text.plain import counted
+from workflow.case.text.plain import aligned, counted
 from workflow.case.text.readable import percent, readable
 from workflow.interface.datasets import Group
 from workflow.kinds import analysis_of, load_case
@@ -84,13 +84,10 @@ class MainResults(tuple[MainResult, ...]):
             )
             for result in self
         ]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines, group = [], ""
-        for result, row in zip(self, rows, strict=True):
-            lines += [result.of] if result.of != group else []
+        for result, line in zip(self, aligned(rows), strict=True):
+            lines += [result.of, line] if result.of != group else [line]
             group = result.of
-            cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
-            lines.append("  ".join(cells).rstrip())
         return "\n".join(lines)
 
 

@@ -72,9 +72,7 @@ def write_pictures(
     return {name: drawn[name] for name in names if name in drawn} if output.report else {}
 
 
-def load_what_draws(
-    pictures: Callable[[], Pictures], output: Output, share: Share = "pictures"
-) -> None:
+def load_what_draws(pictures: Callable[[], Pictures], output: Output, share: Share) -> None:
     """Import the plotting libraries in advance, which takes two seconds."""
     pictures()
     if share == "pictures":

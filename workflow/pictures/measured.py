@@ -20,8 +20,10 @@ from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.pictures.style import AMBER, BLACK, BLUE, ORANGE
 from workflow.shell.analysis import Pictures
+from workflow.shell.output.curves import axis_labels, largest
 from workflow.shell.output.measured import MeasuredCurve, compare_with_curve
 from workflow.shell.output.quantities import CurvesOf
+from workflow.shell.output.tables import heading
 
 # Name of the figure with all measured points.
 MEASURED = "measured"
@@ -154,30 +156,18 @@ def _draw_all(measured: Sequence[Measured], curves: Sequence[CurvesOf], file: h5
 
 def _draw_beside(left: Axes, right: Axes, found: MeasuredCurve) -> None:
     curve, points = found.curve, found.points
-    x_name, x_unit = suited(_most(curve.x, points.x), curve.x_unit)
-    y_name, y_unit = suited(
-        _most(curve.y, points.y), curve.y_unit, everyday_unit(curve.y_unit, curve.title)
-    )
+    x_name, x_unit = suited(largest(curve.x, points.x), curve.x_unit)
+    everyday = everyday_unit(curve.y_unit, curve.title)
+    y_name, y_unit = suited(largest(curve.y, points.y), curve.y_unit, everyday)
     left.plot(curve.x / x_unit, curve.y / y_unit, color=BLUE, label="computed")
     _draw_points(left, found, x_unit, y_unit, "o", ORANGE)
     left.set_title(f"{curve.title[:1].upper()}{curve.title[1:]}")
-    left.set_ylabel(_label(curve.y_name, y_name))
+    left.set(**axis_labels(curve, x_name, y_name))
     left.legend()
     off = (found.computed - points.y) / y_unit
     bars = None if points.deviations is None else points.deviations / y_unit
     right.errorbar(points.x / x_unit, off, bars, fmt="o", color=ORANGE, ms=6.0, capsize=3.0)
     right.axhline(0.0, color=BLACK, lw=0.8)
-    right.set_title("Computed minus measured")
-    right.set_ylabel(_label("deviation", y_name))
-    for axis in left, right:
-        axis.set_xlabel(_label(curve.x_name, x_name))
+    right.set(title="Computed minus measured", xlabel=left.get_xlabel())
+    right.set_ylabel(heading("deviation", y_name))
     right.set_xlim(left.get_xlim())
-
-
-def _most(*values: Array) -> float:
-    finite = np.abs(np.concatenate([v[np.isfinite(v)] for v in values]))
-    return float(finite.max(initial=0.0))
-
-
-def _label(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name

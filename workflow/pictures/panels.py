@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, Literal
 
 import h5py
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from workflow.case.text.typeset import typeset
@@ -124,9 +126,22 @@ def volume_unit(largest: float) -> tuple[float, str]:
     return (1.0, "mm³") if largest >= SMALL_VOLUME else (1e9, "µm³")
 
 
-def legend_on_the_right(axis: Axes, title: str | None = None) -> None:
-    """Draw a legend to the right of the panel."""
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=title)
+def present(drawn: Mapping[str, tuple[Callable[..., Figure], object]], contents: Any) -> Figures:
+    """Return the functions of figures, by name, whose data are there, for these ``contents``.
+
+    ``drawn`` has each function with a value that is true if the results contain its data.
+    """
+    return {
+        name: partial(draw, contents=contents) for name, (draw, there) in drawn.items() if there
+    }
+
+
+def legend_of_colours(figure: Figure, colours: Mapping[str, Any]) -> None:
+    """Draw a legend below all panels that names each colour."""
+    patches = [Patch(facecolor=colour, label=name) for name, colour in colours.items()]
+    figure.legend(
+        handles=patches, loc="outside lower center", ncols=len(patches), columnspacing=1.2
+    )
 
 
 def legend_below(

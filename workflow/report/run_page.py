@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import PurePath
 from typing import Any
 
+from workflow.case.sections import ASIDE, Case
 from workflow.case.text.leaves import GIVEN, Leaf, in_words, leaves_of
 from workflow.case.text.readable import everyday_unit, percent, pretty, readable
 from workflow.case.text.typeset import exact_percent, given, number, typeset
@@ -29,17 +31,16 @@ from workflow.report.page import (
     table,
     unbroken,
 )
-from workflow.report.report_data import ReportData
-from workflow.shell.output.expectations import Verdict, verdicts
+from workflow.shell.output.expectations import Verdict, verdict_of
 from workflow.shell.output.quantities import SummaryQuantity
 from workflow.shell.output.summary import QuantityError, counted_from_first
 
-# Sections of a case that do not affect the results, and those that most readers look for.
-APART = "title", "analysis", "output", "assumed", "measured", "expect", "reported"
+# Sections of a case that most readers look for.
 LOOKED_FOR = (
     *("materials", "friction", "load_path", "wear", "joint", "evolution", "drive", "excitation"),
     *("energies", "ageing", "forces", "frequencies"),
 )
+NOT_LISTED = ("analysis", *ASIDE)
 # Beginnings of the paths of results that are signs (1, 0 or -1).
 SIGNS = "change.", "trend."
 # Length below which a value is not broken into lines.
@@ -48,6 +49,22 @@ SHORT = 20
 AT_ONCE = 0.05
 # Number of letters of a digest that are shown.
 DIGEST = 12
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """Finished run with the data for its report.
+
+    ``case_text`` is the case as run and ``kind`` the name of its kind. ``input_files`` are digests
+    of the files that it names, ``figures`` SVG texts by their names.
+    """
+
+    case: Case
+    case_text: str
+    kind: str
+    summary: Mapping[str, Any]
+    input_files: Mapping[str, str]
+    figures: Mapping[str, str]
 
 
 def run_page(run: ReportData) -> str:
@@ -121,9 +138,8 @@ def _verdicts(run: ReportData) -> list[Verdict | str]:
     """Return the verdict on each expectation, or the reason why there is no number to compare."""
     found: list[Verdict | str] = []
     for entry in run.case.expect:
-        one = run.case.model_copy(update={"expect": (entry,)})
         try:
-            found += verdicts(one, run.summary)
+            found.append(verdict_of(entry, run.summary))
         except QuantityError as error:
             found.append(str(error))
     return found
@@ -231,7 +247,9 @@ def _remarks(summary: Mapping[str, Any]) -> Html:
 
 def _case(run: ReportData) -> Iterator[Html]:
     """Yield the entries of the case that differ from their defaults, in two parts."""
-    leaves = [leaf for leaf in leaves_of(run.case) if leaf.is_shown and _top(leaf) not in APART]
+    leaves = [
+        leaf for leaf in leaves_of(run.case) if leaf.is_shown and _top(leaf) not in NOT_LISTED
+    ]
     first = [leaf for leaf in leaves if _top(leaf) in LOOKED_FOR]
     assumed = run.case.assumed
     if first:

@@ -11,8 +11,7 @@ from workflow.case.sections import Case, Measured
 from workflow.errors import UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import vector_figures
-from workflow.report.report_data import ReportData
-from workflow.report.run_page import run_page
+from workflow.report.run_page import ReportData, run_page
 from workflow.shell.analysis import Analysis, Pictures
 from workflow.shell.folders.folder import DIGESTS, OutputFolder
 from workflow.shell.folders.lock import locked
@@ -52,19 +51,13 @@ def write_report(root: Path, out: Path | None = None) -> Path:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_page(run, out)
         return out
-    check_finished(root)
+    folder = OutputFolder(root)
+    folder.check_ended()
     with locked(root):
-        run, folder = report_data_of(root), OutputFolder(root)
+        run = report_data_of(root)
         path = folder.reserve_report()
         write_page(run, path)
     return path
-
-
-def check_finished(root: Path) -> OutputFolder:
-    """Return the folder of a finished run. Raises UserError for anything else."""
-    folder = OutputFolder(root)
-    folder.check_ended()
-    return folder
 
 
 def report_data_of(root: Path, figures: bool = True) -> ReportData:
@@ -72,10 +65,10 @@ def report_data_of(root: Path, figures: bool = True) -> ReportData:
 
     Raises UserError as :func:`write_report` does.
     """
-    folder = check_finished(root)
-    summary = folder.read_summary()
+    folder = OutputFolder(root)
+    folder.check_ended()
+    summary, results = folder.read_summary(), folder.results
     digests = summary[DIGESTS]
-    results = folder.results
     if digests.get(results.name, "") != file_digest(results):
         raise UserError(f"{results}: differs from the run in {root}; {folder.again}")
     case = load_case(folder.case)

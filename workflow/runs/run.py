@@ -15,7 +15,7 @@ from workflow.case.text.writing import dump_case
 from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import load_what_draws, write_pictures
-from workflow.report.report_data import ReportData
+from workflow.report.run_page import ReportData
 from workflow.report.writing import pictures_of, write_page
 from workflow.runs.first_look import first_look
 from workflow.runs.provenance import case_values, provenance_of

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.box import SIMPLE
-from rich.console import Console
 from rich.table import Column, Table
 
 from workflow.errors import UserError
@@ -14,7 +13,7 @@ from workflow.runs.run import run_case
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.expectations import verdicts
 from workflow.shell.output.summary import QuantityError
-from workflow.shell.terminal.screen import Loudness
+from workflow.shell.terminal.screen import Loudness, tables_console
 from workflow.shell.terminal.screen import console as terminal
 
 COLUMNS = "expected", "computed", "unit", "error", "verdict", "kind", "source"
@@ -31,9 +30,7 @@ def verify_cases(cases: tuple[Path, ...], out: Path, loudness: Loudness = Loudne
     for path, case in loaded:
         if not case.expect:
             raise UserError(f"{path}: nothing to verify: the case has no `expect` list")
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console.width = FILE_WIDTH
+    console = tables_console(FILE_WIDTH)
     met_all = True
     for number, (path, case) in enumerate(loaded, 1):
         folder = out / path.stem

@@ -99,11 +99,6 @@ def as_written(case: Any) -> tuple[Any, None]:
     return case, None
 
 
-def no_quantities(case: Any, summary: Summary) -> Sequence[SummaryQuantity]:
-    """Return no quantities, for an analysis that names none."""
-    return ()
-
-
 def expected(case: Case, summary: Summary) -> list[str]:
     """Return the expected quantities of a case; a value of 0 is left out (no relative error)."""
     return [entry.quantity for entry in case.expect if entry.value]
@@ -186,7 +181,7 @@ class Analysis(Generic[AnyCase]):
     run: Callable[[Run[AnyCase]], None]
     memory: Callable[[AnyCase], Memory]
     run_time: Callable[[AnyCase], RunTime]
-    quantities: Callable[[AnyCase, Summary], Sequence[SummaryQuantity]] = no_quantities
+    quantities: Callable[[AnyCase, Summary], Sequence[SummaryQuantity]]
     layout: Callable[[AnyCase], Layout] = lambda case: Layout({})
     curves: Sequence[CurvesOf] = ()
     pictures: Callable[[], Pictures] | None = None

@@ -9,18 +9,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.case.text.readable import suited
 from workflow.pictures.panels import legend_below, new_figure, panel_grid
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.shell.analysis import Analysis
-from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.output.curves import Curve, curves_in
+from workflow.shell.output.curves import Curve, axis_labels, curves_of_run, suited_units
 from workflow.sweep.bands import FEWEST, Piece, curve_band, quantiles
 from workflow.sweep.first_order import sides
 from workflow.sweep.table import SweepRow
@@ -76,12 +73,9 @@ def _curves(analysis: Analysis[Any], rows: Sequence[SweepRow]) -> Curves:
     """Return the curves of the finished runs, by title."""
     curves: Curves = {}
     for row in rows:
-        if not row.done:
-            continue
-        with h5py.File(OutputFolder(row.finished.folder).results) as file:
-            for wanted in analysis.curves:
-                for curve in curves_in(file, wanted):
-                    curves.setdefault(curve.title, []).append(curve)
+        if row.done:
+            for curve in curves_of_run(row.finished.folder, analysis.curves):
+                curves.setdefault(curve.title, []).append(curve)
     return curves
 
 
@@ -107,8 +101,7 @@ def _draw(title: str, way: Way, panels: Curves) -> Figure:
 
 def _draw_panel(axis: Axes, way: Way, name: str, curves: Sequence[Curve]) -> None:
     first = curves[0]
-    x_unit, x_size = suited(max(_largest(curve.x) for curve in curves), first.x_unit)
-    y_unit, y_size = suited(max(_largest(curve.y) for curve in curves), first.y_unit)
+    (x_unit, x_size), (y_unit, y_size) = suited_units(curves)
     shown = [(curve.x / x_size, curve.y / y_size) for curve in curves]
     if pieces := curve_band(shown, way.fewest, way.sides):
         _draw_band(axis, way, pieces)
@@ -121,8 +114,7 @@ def _draw_panel(axis: Axes, way: Way, name: str, curves: Sequence[Curve]) -> Non
         )
     if first.logarithmic:
         axis.set_yscale("log", nonpositive="mask")
-    axis.set_xlabel(_label(first.x_name, x_unit))
-    axis.set_ylabel(_label(first.y_name, y_unit))
+    axis.set(**axis_labels(first, x_unit, y_unit))
 
 
 def _draw_band(axis: Axes, way: Way, pieces: Sequence[Piece]) -> None:
@@ -131,12 +123,3 @@ def _draw_band(axis: Axes, way: Way, pieces: Sequence[Piece]) -> None:
         labels = (None, None) if number else (way.band, way.middle)
         axis.fill_between(piece.places, piece.lower, piece.upper, label=labels[0], **look)
         axis.plot(piece.places, piece.median, color=ORANGE, label=labels[1])
-
-
-def _largest(values: Array) -> float:
-    finite = np.abs(values[np.isfinite(values)])
-    return float(finite.max()) if finite.size else 0.0
-
-
-def _label(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name

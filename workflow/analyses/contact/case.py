@@ -20,7 +20,7 @@ from workflow.analyses.contact.load_table import PRESSING, LoadTable
 from workflow.analyses.contact.plausibility import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.case.fields import File, Quantity
-from workflow.case.files.input_files import InputFileError, read_heights
+from workflow.case.files.input_files import read_heights
 from workflow.case.loading import word_at
 from workflow.case.plausibility import heights, hertz, uneven_cells
 from workflow.case.sections import (
@@ -35,6 +35,7 @@ from workflow.case.sections import (
     Stress,
     Title,
     Tolerance,
+    at_entry,
     disagreement,
     entry,
 )
@@ -428,10 +429,8 @@ def surfaces_in_words(bodies: Bodies, grid: Grid) -> list[tuple[str, str]]:
 
 def require_shape(file: str, grid: tuple[int, int]) -> None:
     """Raise an error unless a file of heights has a value for each cell of ``grid``."""
-    try:
+    with at_entry("structure.file"):
         shape = read_heights(file).shape
-    except InputFileError as error:
-        raise disagreement(str(error), "structure.file") from error
     if shape != grid:
         cells = f"[{shape[0]}, {shape[1]}]" if grid[1] > 1 or shape[1] > 1 else f"{shape[0]}"
         raise disagreement(

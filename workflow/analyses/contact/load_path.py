@@ -10,10 +10,10 @@ from pydantic import model_validator
 
 from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
 from workflow.case.fields import File, Quantity, Whole
-from workflow.case.files.input_files import InputFileError
 from workflow.case.files.table_file import read_columns
 from workflow.case.sections import (
     Section,
+    at_entry,
     disagreement,
     entry,
     one_of,
@@ -121,10 +121,8 @@ class LegsOrFile(Section, Generic[LegT]):
             raise disagreement(
                 f"{problem}; allowed: either legs or file", "file" if self.legs else "legs"
             )
-        try:
+        with at_entry("file"):
             places = dict.fromkeys(self.table().columns, "file")
-        except InputFileError as error:
-            raise disagreement(str(error), "file") from error
         for number, leg in reversed(list(enumerate(self.legs))):
             given = [key for key in places if getattr(leg, key) is not None]
             places |= {key: f"legs.{number}.{key}" for key in given}
@@ -133,10 +131,14 @@ class LegsOrFile(Section, Generic[LegT]):
             raise disagreement(message, places.get(key, "legs" if self.legs else "file"))
         return self
 
+    def _quantities(self) -> dict[str, Quantity]:
+        """Return the quantities of a leg, by name."""
+        (leg,) = sections_of(type(self).model_fields["legs"].annotation)
+        return quantities_of(leg)
+
     def table(self) -> LoadTable:
         """Return every increment of the path."""
-        (leg_model,) = sections_of(type(self).model_fields["legs"].annotation)
-        quantities = quantities_of(leg_model)
+        quantities = self._quantities()
         if self.file is not None:
             return LoadTable(read_columns(self.file, quantities))
         targets = {key: [getattr(leg, key) for leg in self.legs] for key in quantities}
@@ -144,8 +146,7 @@ class LegsOrFile(Section, Generic[LegT]):
 
     def ranges(self) -> Iterator[str]:
         """Yield the range of values of each load, with 0 included."""
-        (leg,) = sections_of(type(self).model_fields["legs"].annotation)
-        units = {name: quantity.unit for name, quantity in quantities_of(leg).items()}
+        units = {name: quantity.unit for name, quantity in self._quantities().items()}
         for name, values in self.table().columns.items():
             low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
             upwards = f"up to {plain(high, units[name])}"

@@ -22,9 +22,8 @@ from sa_solver.surfaces.scans import (
 )
 from sa_solver.types import Array, Grid
 from workflow.case.fields import File, Quantity, Word, split_dataset
-from workflow.case.files.input_files import InputFileError
 from workflow.case.files.scan_files import ENDINGS, NEAR, UNITS, read_scan
-from workflow.case.sections import Length, Section, disagreement, entry, one_of
+from workflow.case.sections import Length, Section, at_entry, disagreement, entry, one_of
 from workflow.case.text.plain import plain, shares
 
 Shift = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4, range_text="-10 to 10 m")]
@@ -90,9 +89,8 @@ class MeasuredSurface(Section):
     @model_validator(mode="after")
     def _can_be_read(self) -> MeasuredSurface:
         try:
-            self.scan()
-        except InputFileError as error:
-            raise disagreement(str(error), "file") from error
+            with at_entry("file"):
+                self.scan()
         except InputError as error:
             raise disagreement(f"{self.file}: {error}", "missing", "file") from error
         return self

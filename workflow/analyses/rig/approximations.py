@@ -38,11 +38,9 @@ def _samples(case: Case) -> Iterator[Rung]:
 
 
 OF_MOTION = (
+    Approximation("step", "step of the motion in time", _time_steps, ("integration.step",), 2.0),
     Approximation(
-        *("step", "step of the motion in time", _time_steps, ("integration.step",), 2.0),
-    ),
-    Approximation(
-        *("harmonics", "odd harmonics of the motion", _harmonics, ("resolution.samples",), 2.0),
+        "harmonics", "odd harmonics of the motion", _harmonics, ("resolution.samples",), 2.0
     ),
     Approximation("samples", "samples of a period", _samples, ("resolution.harmonics",), 2.0),
 )

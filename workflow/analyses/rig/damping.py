@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from workflow.analyses.rig.places import NAMED, Against, Direction
-from workflow.case.fields import Quantity, ScalarOrList
+from workflow.case.fields import Ascending, Quantity, ScalarOrList
 from workflow.case.sections import Section, Title, disagreement, entry
 from workflow.case.text.plain import counted, shares
 
@@ -47,8 +47,8 @@ class RayleighRatios(Section):
     """Damping in proportion to mass and stiffness, given by two damping ratios."""
 
     kind: Literal["ratios"] = entry("two damping ratios", "ratios")
-    frequencies: tuple[ModeFrequency, ModeFrequency] = entry(
-        "frequencies at which damping is known, ascending [Hz]", ["40 Hz", "200 Hz"]
+    frequencies: Annotated[tuple[ModeFrequency, ModeFrequency], Ascending("lower, then upper")] = (
+        entry("frequencies at which damping is known, ascending [Hz]", ["40 Hz", "200 Hz"])
     )
     ratios: tuple[AnyRatio, AnyRatio] = entry(
         "damping ratios at these frequencies [1]", ["0.5 %", "1 %"]
@@ -57,8 +57,6 @@ class RayleighRatios(Section):
     @model_validator(mode="after")
     def _damps_everywhere(self) -> RayleighRatios:
         (low, high), (first, second) = self.frequencies, self.ratios
-        if low >= high:
-            raise disagreement("not ascending; allowed: lower, then upper", "frequencies")
         if not low / high * first <= second <= high / low * first:
             raise disagreement(
                 f"{first:g} and {second:g}: one factor would be below zero and feed energy into "

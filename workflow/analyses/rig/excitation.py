@@ -7,13 +7,13 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from sa_solver.types import Array
-from workflow.case.fields import File, Quantity, Whole
-from workflow.case.files.input_files import InputFileError
+from workflow.case.fields import Ascending, File, Quantity, Whole
 from workflow.case.files.table_file import read_table_file
-from workflow.case.sections import Length, Section, disagreement, entry
+from workflow.case.sections import Length, Section, at_entry, disagreement, entry
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual rig.
 Frequency = Annotated[float, Quantity("Hz", above=0.0, at_most=1e7)]
+FrequencySpan = Annotated[tuple[Frequency, Frequency], Ascending("lower, then upper end")]
 Time = Annotated[float, Quantity("s", above=0.0, at_most=1e5)]
 DrivingForce = Annotated[
     float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 to 1e6 kN")
@@ -72,7 +72,7 @@ class Hammer(ForceOnMass):
     force: DrivingForce = entry("largest [N]", "100 N")
     duration: Time = entry("duration of the blow [s]", "0.4 ms")
     record: Time = entry("length of the record [s]", "1 s")
-    band: tuple[Frequency, Frequency] = entry(
+    band: FrequencySpan = entry(
         "band around the first mode, for its frequency and damping against amplitude [Hz]",
         ["20 Hz", "500 Hz"],
     )
@@ -87,9 +87,7 @@ class Hammer(ForceOnMass):
                 f"{self.record:g} s: ends with the blow; allowed: many times the duration",
                 *("record", "duration"),
             )
-        low, high = self.band
-        if low >= high:
-            raise disagreement("not ascending; allowed: lower, then upper end", "band")
+        high = self.band[1]
         if self.highest > SEEN / self.duration:
             raise disagreement(
                 f"{self.highest:g} Hz: a blow of {self.duration:g} s has no force at "
@@ -113,10 +111,8 @@ class Recorded(ForceOnMass):
 
     @model_validator(mode="after")
     def _is_a_record(self) -> Recorded:
-        try:
+        with at_entry("file"):
             times, _ = self.read()
-        except InputFileError as error:
-            raise disagreement(str(error), "file") from error
         if len(times) < 2 or not (times[1:] > times[:-1]).all():
             raise disagreement(
                 "times that do not ascend; allowed: two or more ascending times", "file"

@@ -12,8 +12,7 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.evolution import PositiveEnergy, Table, TotalEnergy
 from workflow.case.fields import Quantity
 from workflow.case.loading import YAML, CaseFile
-from workflow.case.sections import Section, disagreement, entry
-from workflow.errors import UserError
+from workflow.case.sections import Section, at_entry, disagreement, entry
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual material.
 Change = Annotated[float, Quantity("1", at_least=-1.0, at_most=1e6)]
@@ -120,10 +119,8 @@ class EvolutionSection(Section):
         # Imported here to avoid a cycle: that module reads units, which belong to this package.
         from workflow.analyses.wear.output.loop_table import read_loop_table
 
-        try:
+        with at_entry("file"):
             table = read_loop_table(Path(self.file))
-        except UserError as error:
-            raise disagreement(str(error), "file") from error
         if table.per_length:
             raise disagreement(
                 "loops of a line contact, per mm; allowed: those of a whole joint", "file"

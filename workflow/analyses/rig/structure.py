@@ -20,9 +20,9 @@ from workflow.analyses.rig.joint_sections import (
 from workflow.analyses.rig.places import Against, Direction, KeptPoints, Moved
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.case.fields import Quantity, Whole, shown
-from workflow.case.files.input_files import InputFileError, open_hdf5
+from workflow.case.files.input_files import open_hdf5
 from workflow.case.loading import YAML, CaseFile, outline_of
-from workflow.case.sections import Length, Section, Title, disagreement, entry
+from workflow.case.sections import Length, Section, Title, at_entry, disagreement, entry
 from workflow.case.text.plain import entries
 from workflow.models.rig.names import MODE
 
@@ -269,10 +269,8 @@ class ReducedBody(JointedBody, StoredBody):
     @model_validator(mode="after")
     def _file_is_a_model(self) -> ReducedBody:
         if self.body is None:
-            try:
+            with at_entry("file"):
                 self.stored()
-            except InputFileError as error:
-                raise disagreement(str(error), "file") from error
         return self
 
     def stored(self) -> ReducedModel:
@@ -376,14 +374,14 @@ def joint_rows(
     return [(name, f"{law.law}, {entries(law)}") for name, law in every if law is not None]
 
 
-def refuse_own_joints(structure: Section, otherwise: str) -> None:
-    """Refuse laws of individual joints of a body; ``otherwise`` names what is allowed."""
+def refuse_own_joints(structure: Section) -> None:
+    """Refuse laws of individual joints of a body whose contact wears."""
     if not isinstance(structure, JointedBody):
         return
     for number, law in enumerate(own_laws(structure)):
         if law is not None:
             raise disagreement(
-                f"{law.law}: a law of its own; allowed: {otherwise}",
+                f"{law.law}: a law of its own; allowed: the contact that wears alone",
                 f"structure.joints.{number}.joint",
             )
 

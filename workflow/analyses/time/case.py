@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -39,7 +38,7 @@ from workflow.analyses.rig.structure import (
 )
 from workflow.analyses.wear.case.evolution import PositiveEnergy, TotalEnergy
 from workflow.analyses.wear.case.sections import Cycles
-from workflow.case.fields import Quantity
+from workflow.case.fields import Ascending, Quantity
 from workflow.case.sections import (
     Case,
     DottedPath,
@@ -128,11 +127,12 @@ class TimeCase(Case):
         "evolution of the parameters with dissipated energy; without it none",
         default=EvolutionSection(),
     )
-    energies: tuple[TotalEnergy, ...] = entry(
+    energies: Annotated[
+        tuple[TotalEnergy, ...], Field(min_length=1), Ascending("ascending energies")
+    ] = entry(
         "energies dissipated so far, ascending, at which the joint is reported [N*mm]",
         ["0 J", "1 kJ"],
         default=(0.0,),
-        min_length=1,
     )
     output: OutputWithoutFields = entry(
         "files written with summary and results", default=OutputWithoutFields()
@@ -149,12 +149,6 @@ class TimeCase(Case):
                     f"{self.joint.law} has no {name}; allowed: those of the joint",
                     f"evolution.{name}",
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _energies_ascend(self) -> TimeCase:
-        if any(after <= before for before, after in pairwise(self.energies)):
-            raise disagreement("not ascending; allowed: ascending energies", "energies")
         return self
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import h5py
@@ -11,13 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.time.outcome import LOOP, MOTION, RESPONSE, RING_DOWN, MotionContents
+from workflow.analyses.time.outcome import MotionContents
 from workflow.pictures.panels import (
     Figures,
     legend_below,
     new_figure,
     panel_grid,
     plain_ticks,
+    present,
     shaded,
     widen,
 )
@@ -56,16 +56,14 @@ def figures_of(contents: MotionContents) -> Figures:
     """Return the figures of a run, by name."""
     groups = contents.curves
     drawn = {
-        "loops": (loops, LOOP in groups),
-        "frequency_response": (frequency_response, RESPONSE in groups),
-        "ring_down": (ring_down, RING_DOWN in groups),
+        "loops": (loops, "loop" in groups),
+        "frequency_response": (frequency_response, "frequency_response" in groups),
+        "ring_down": (ring_down, "ring_down" in groups),
         # A figure of the ring-down shows the motion too.
-        "motion": (motion, MOTION in groups and RING_DOWN not in groups),
+        "motion": (motion, "motion" in groups and "ring_down" not in groups),
         "evolution": (evolution, bool(contents.evolution)),
     }
-    return {
-        name: partial(draw, contents=contents) for name, (draw, there) in drawn.items() if there
-    }
+    return present(drawn, contents)
 
 
 def _states(
@@ -93,7 +91,7 @@ def _label(state: h5py.Group, aged: bool) -> str:
 
 def loops(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw force against displacement of the joint over a closed cycle, at several energies."""
-    shown = _states(file, contents, LOOP)
+    shown = _states(file, contents, "loop")
     figure = new_figure(_loops_title([_area(loop) for _, _, loop in shown]), 7.0)
     axis = figure.subplots()
     for label, colour, loop in shown:
@@ -176,7 +174,7 @@ def _evolution_title(group: h5py.Group, panels: list[str], aged: bool) -> str:
 
 def frequency_response(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw acceleration over force: over all frequencies, and the first mode enlarged."""
-    shown = _states(file, contents, RESPONSE)
+    shown = _states(file, contents, "frequency_response")
     figure = new_figure(_response_title(shown), 8.5)
     top, bottom = figure.subplots(2, 1)
     first = max(_first(response, "frequency") for _, _, response in shown)
@@ -226,13 +224,13 @@ LEAST_SOFTENING, LEAST_DAMPING = 0.1, 0.1
 
 def ring_down(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw frequency and damping of the first mode against its amplitude, and the motion itself."""
-    shown = _states(file, contents, MOTION)
+    shown = _states(file, contents, "motion")
     figure = new_figure("First mode of the ring-down against its amplitude", 9.0)
     places = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.3))
     history = figure.add_subplot(places[0, :])
     left, right = (figure.add_subplot(places[1, place]) for place in (0, 1))
     for label, colour, moved in shown:
-        stuck, envelope = float(moved.parent.attrs["stuck"][0]), moved.parent.get(RING_DOWN)
+        stuck, envelope = float(moved.parent.attrs["stuck"][0]), moved.parent.get("ring_down")
         missing = "" if envelope else ", no ring-down"
         _draw_history(history, moved, colour, f"{label}: stuck {stuck:.4g} Hz{missing}")
         if not envelope:
@@ -274,7 +272,7 @@ def _faded(moved: h5py.Group) -> int:
 
 def motion(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw force, displacement and the energy that the joint has dissipated, over time."""
-    shown = _states(file, contents, MOTION)
+    shown = _states(file, contents, "motion")
     figure = new_figure("Motion of the rig under its excitation", 9.0)
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     longest = max(_faded(history) for _, _, history in shown)

@@ -27,7 +27,7 @@ from workflow.analyses.time.motion import (
     step_control,
     warn_of_steps,
 )
-from workflow.analyses.time.outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
+from workflow.analyses.time.outcome import State, TimeOutcome
 from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 from workflow.layout.declared import Arrays
@@ -112,15 +112,15 @@ def _state(
     }
     seen = response.frequency <= hammer.highest
     curves = {
-        MOTION: motion_curves(rig, motion, blow),
-        RESPONSE: {
+        "motion": motion_curves(rig, motion, blow),
+        "frequency_response": {
             "frequency": response.frequency[seen],
             "magnitude": np.abs(response.value[seen]),
             "phase": np.angle(response.value[seen]),
         },
     }
     if decay is not None:
-        curves[RING_DOWN] = decay
+        curves["ring_down"] = decay
     return State(energy, None, joint.parameters(energy), numbers, curves)
 
 

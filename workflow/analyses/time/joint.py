@@ -24,7 +24,7 @@ from wear.joints.measured.loop_record import MeasuredLoopError
 from wear.joints.measured.measured_loops import measure_loops
 from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import JointModel
-from workflow.analyses.time.outcome import LOOP, State, TimeOutcome
+from workflow.analyses.time.outcome import State, TimeOutcome
 from workflow.errors import MethodFailed, UserError
 from workflow.layout.declared import Arrays
 from workflow.models.rig.laws import Laws
@@ -74,7 +74,7 @@ def _state(model: JointModel, energy: float, cycles: float, amplitude: float) ->
         "force": 0.5 * float(np.ptp(force)),
         "extracted": extracted(displacement, force, parameters["normal_load"]),
     }
-    curves = {LOOP: {"displacement": displacement, "force": force}}
+    curves = {"loop": {"displacement": displacement, "force": force}}
     return State(energy, cycles, parameters, numbers, curves)
 
 

@@ -18,27 +18,24 @@ _PARAMETERS = """
     normal_load | N | energy | normal load
 """
 PARAMETERS = declared(_PARAMETERS)
-# Groups of curves of a state.
-LOOP, MOTION, RESPONSE, RING_DOWN = "loop", "motion", "frequency_response", "ring_down"
-EVOLUTION = "evolution"
 LAYOUT = Layout.read(
     f"""
-{EVOLUTION}
+evolution
     energy | N mm | energy | energy dissipated so far in the joint
     cycles | 1 | energy | cycles so far
     energy_per_cycle | N mm | energy | energy dissipated in a cycle
     {_PARAMETERS}
-states/<state>/{LOOP}
+states/<state>/loop
     displacement | mm | point | displacement of the joint, or the mean of several, in a cycle
     force | N | point | force that resists it
-states/<state>/{MOTION}{CURVES}
+states/<state>/motion{CURVES}
     joints_displacement | mm | time entry | mean displacement of each entry of structure.joints
     joints_force | N | time entry | sum of the forces of each entry of structure.joints, resisting
-states/<state>/{RESPONSE}
+states/<state>/frequency_response
     frequency | Hz | frequency | frequency
     magnitude | mm/(s^2 N) | frequency | acceleration of the reported point over the excitation
     phase | rad | frequency | phase of the acceleration to the excitation
-states/<state>/{RING_DOWN}
+states/<state>/ring_down
     amplitude | mm | amplitude | amplitude of the reported point, in its first mode
     frequency | Hz | amplitude | instantaneous frequency
     damping_ratio | 1 | amplitude | instantaneous damping ratio

@@ -6,12 +6,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from workflow.analyses.time.case import JointCase, RigCase, TimeCase, joules
-from workflow.analyses.time.outcome import EVOLUTION, LAYOUT, MOTION, State, TimeOutcome
+from workflow.analyses.time.outcome import LAYOUT, State, TimeOutcome
 from workflow.case.fields import in_unit_of
 from workflow.shell.analysis import Run
 from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish, number_at
-from workflow.shell.output.tables import write_curves
 from workflow.shell.terminal.reporter import Reporter
 
 TimeRun = Run[JointCase | RigCase]
@@ -36,22 +35,20 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
     attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": outcome.seen or None}
     with run_results(run, case, LAYOUT, attributes) as writer:
         writer.put_contents(outcome.contents)
-        writer.put(EVOLUTION, outcome.evolution)
         what = "parameters of the joint over the energy it has dissipated"
-        path = folder.reserve(f"{EVOLUTION}.csv", what)
-        write_curves(path, outcome.evolution, LAYOUT.datasets(EVOLUTION))
+        writer.put_table(folder.reserve("evolution.csv", what), "evolution", outcome.evolution)
         for number, state in enumerate(outcome.states):
             place = f"states/{number:05d}"
             scalars = {k: v for k, v in state.numbers.items() if isinstance(v, int | float | list)}
             parameters = {"energy": state.energy, "cycles": state.cycles, **state.parameters}
             writer.put(place, {}, **(parameters | scalars))
             for group, curves in state.curves.items():
-                writer.put(f"{place}/{group}", curves)
-                if group == MOTION:
+                if group == "motion":
+                    writer.put(f"{place}/{group}", curves)
                     continue
                 what = f"{group.replace('_', ' ')} at {joules(state.energy)}"
                 path = folder.reserve(f"{group}_{number:05d}.csv", what)
-                write_curves(path, curves, LAYOUT.datasets(f"{place}/{group}"))
+                writer.put_table(path, f"{place}/{group}", curves)
 
 
 # --- summary ------------------------------------------------------------------------------------

@@ -30,7 +30,7 @@ from workflow.analyses.time.motion import (
     step_control,
     warn_of_steps,
 )
-from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome
+from workflow.analyses.time.outcome import State, TimeOutcome
 from workflow.errors import MethodFailed
 from workflow.models.rig.rig_model import RigModel
 from workflow.shell.terminal.reporter import Reporter
@@ -103,7 +103,7 @@ def _run_recorded(
             largest = {"largest_force": float(np.abs(rig.loop(motion)[1]).max())}
             numbers = rig.modes(joint.at(energy)) | motion_numbers(rig, motion) | largest
             warn_of_steps(energy, motion.error, reporter)
-            curves = {MOTION: motion_curves(rig, motion, force)}
+            curves = {"motion": motion_curves(rig, motion, force)}
             states.append(State(energy, None, joint.parameters(energy), numbers, curves))
     return TimeOutcome(case, tuple(states), evolution_curve(joint, case.energies[-1]))
 
@@ -155,7 +155,7 @@ def _steady_state(
         "change": cycle.change,
         "step_error": cycle.error,
     }
-    curves = {LOOP: {"displacement": cycle.stretch, "force": cycle.force}}
+    curves = {"loop": {"displacement": cycle.stretch, "force": cycle.force}}
     return State(energy, cycles, parameters, numbers, curves)
 
 

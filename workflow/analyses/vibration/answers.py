@@ -11,16 +11,14 @@ from fe_models.dynamics.curves.crossings import motions_at
 from fe_models.dynamics.curves.forced_response import ResponseBranch
 from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
-from sa_solver.steps import Steps
-from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import accuracy_of, step_control
+from workflow.analyses.vibration.following import VibrationRun
+from workflow.analyses.vibration.model import step_control
 from workflow.analyses.vibration.output.harmonics import harmonics_of
-from workflow.analyses.vibration.output.outcome import ANSWER, Answers
+from workflow.analyses.vibration.output.outcome import Answers
 from workflow.analyses.vibration.response import warn_of_error
 from workflow.layout.declared import Arrays
 from workflow.models.vibration.motions import accurate, motion_columns
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.terminal.reporter import Reporter
 
 # Share of the vibration. A motion that changes more as harmonics are added is another one.
 ANOTHER = 0.3
@@ -30,43 +28,37 @@ TOLD = "phase", "energy_per_cycle", "damping", "slip", "separated"
 
 
 def answers_under(
-    case: VibrationCase,
-    model: VibratingStructure,
-    branch: ResponseBranch,
-    reporter: Reporter,
-    steps: Steps,
+    run: VibrationRun, branch: ResponseBranch
 ) -> tuple[Answers | None, dict[str, Arrays]]:
     """Return the motions of a branch at the frequencies of a case, and their harmonics by group.
 
     Returns None and no harmonics where the case asks for no frequencies. A frequency that the curve
     does not reach gives a warning, and so does a motion that is not found.
     """
+    case, model = run.case, run.structure
     if not case.at:
         return None, {}
-    force, accuracy, control = branch.solutions[0].force, accuracy_of(case), step_control(case)
-    reported = case.amount.as_text(force)
+    reported = case.amount.as_text(branch.solutions[0].force)
     every: list[HarmonicSolution] = []
     numbers: list[dict[str, Any]] = []
     for frequency in case.at:
-        reporter.doing(f"{reported}: motions at {frequency:g} Hz")
-        found = motions_at(branch, frequency, control, steps)
+        run.reporter.doing(f"{reported}: motions at {frequency:g} Hz")
+        found = motions_at(branch, frequency, step_control(case), run.steps)
         motions = [
-            steps("accurate motion", partial(_accurate, branch, motion, accuracy))
+            run.steps("accurate motion", partial(_accurate, branch, motion, run.accuracy))
             for motion in found
             if motion.converged
         ]
         message = _message(branch, frequency, found)
         if message:
-            reporter.warn(f"{reported} at {frequency:g} Hz: {message}")
+            run.reporter.warn(f"{reported} at {frequency:g} Hz: {message}")
         those = [_numbers(model, branch, motion) for motion in motions]
         for motion in those:
-            named = f"{reported}: the motion at {frequency:g} Hz"
-            warn_of_error(named, motion["error"], case, reporter)
+            warn_of_error(run, f"{reported}: the motion at {frequency:g} Hz", motion["error"])
         numbers.append({"frequency": frequency, "motions": those, "message": message})
         every += motions
     harmonics: dict[str, Arrays] = {
-        ANSWER.format(number): harmonics_of(model.rig, motion)
-        for number, motion in enumerate(every)
+        f"at_{number:05d}": harmonics_of(model.rig, motion) for number, motion in enumerate(every)
     }
     return Answers(_table(model, branch, every), tuple(numbers)), harmonics
 

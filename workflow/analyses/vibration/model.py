@@ -11,21 +11,21 @@ import numpy as np
 from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.rig import natural_frequencies
+from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.laws import law_of, laws_of
 from workflow.analyses.rig.structure import FrictionRig
 from workflow.analyses.vibration.case.case_base import VibrationCaseBase
 from workflow.analyses.vibration.case.load import driving_of
-from workflow.analyses.vibration.case.ring import frequencies_by_diameters
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.memory import memory
-from workflow.analyses.vibration.output.outcome import RING
 from workflow.case.sections import Case
 from workflow.errors import UserError
 from workflow.layout.declared import Arrays
 from workflow.models.rig.laws import Laws, law_of_all
-from workflow.models.rig.rig_model import RigModel
+from workflow.models.rig.rig_model import MOST_FREQUENCIES, RigModel
 from workflow.models.vibration.model import VibrationModel
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.models.vibration.sweep import FrequencySweep
@@ -128,7 +128,7 @@ def structure_numbers(structure: VibratingStructure) -> dict[str, Any]:
     }
     if rig.sector is not None:
         ring = rig.sector.ring
-        numbers[RING] = {"sectors": ring.sectors, "engine_order": ring.engine_order}
+        numbers["ring"] = {"sectors": ring.sectors, "engine_order": ring.engine_order}
     if structure.driving.left_out:
         numbers["left_out_of_records"] = list(structure.driving.left_out)
     if rig.pressing is not None:
@@ -142,7 +142,16 @@ def diameters(structure: VibratingStructure) -> Arrays | None:
     rig = structure.rig
     if rig.sector is None:
         return None
-    return frequencies_by_diameters(rig.sector, rig.stuck(structure.law, structure.resting))
+    numbers = range(rig.sector.ring.sectors // 2 + 1)
+    models = [rig.sector.at(number) for number in numbers]
+    springs: dict[str, float | Array] = {
+        "free": 0.0,
+        "stuck": rig.stuck(structure.law, structure.resting),
+    }
+    return {"diameters": np.array(numbers)} | {
+        name: np.array([natural_frequencies(model, of)[:MOST_FREQUENCIES] for model in models])
+        for name, of in springs.items()
+    }
 
 
 def contact_at_rest(structure: VibratingStructure) -> Arrays | None:

@@ -9,18 +9,15 @@ import numpy as np
 from fe_models.dynamics.curves.nonlinear_mode import LinearMode, ModeMotion, along_nonlinear_mode
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError
-from sa_solver.steps import Steps
 from wear.joints.periodic.march import SLIP
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import step_control
+from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.outcome import Curves
-from workflow.analyses.vibration.response import progress_along
 from workflow.errors import MethodFailed, UserError
 from workflow.layout.declared import Arrays
 from workflow.models.vibration.motions import amplitudes_of
 from workflow.models.vibration.results import LARGEST_ERROR
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.terminal.reporter import Reporter
 
 # Share of the largest motion of a mode, below which the observed point does not take part.
 STILL = 1e-6
@@ -38,21 +35,14 @@ def refuse_missing_modes(case: VibrationCase, model: VibratingStructure) -> None
             raise UserError(f"modes.numbers: {error}; allowed: one of these") from error
 
 
-def mode_of(
-    case: VibrationCase,
-    number: int,
-    model: VibratingStructure,
-    problem: HarmonicBalance,
-    reporter: Reporter,
-    steps: Steps,
-) -> Curves:
+def mode_of(run: VibrationRun, number: int, problem: HarmonicBalance) -> Curves:
     """Return a mode over the amplitudes of the case, with the harmonics of the ``problem``.
 
     Raises MethodFailed for a mode in which the observed point does not move, or that is not found
     at the least amplitude. A curve that ends before the largest amplitude gives a warning.
     """
-    assert case.modes is not None
-    linear = LinearMode.of(problem, number)
+    assert run.case.modes is not None
+    linear, model = LinearMode.of(problem, number), run.structure
     moved = abs(float(model.rig.seen[-1] @ linear.shape))
     if moved <= STILL * np.abs(linear.shape).max():
         raise MethodFailed(
@@ -61,16 +51,16 @@ def mode_of(
             "leave the mode out"
         )
     # Convert observed amplitudes to modal ones, by the shape of the linear mode.
-    least, largest = (amplitude / moved for amplitude in case.modes.amplitudes)
-    control = step_control(case, progress_along((least, largest), True, "t^0.5 mm", reporter))
-    branch = along_nonlinear_mode(problem, linear, (least, largest), control, steps)
+    least, largest = (amplitude / moved for amplitude in run.case.modes.amplitudes)
+    control = run.control((least, largest), "t^0.5 mm")
+    branch = along_nonlinear_mode(problem, linear, (least, largest), control, run.steps)
     if not branch.motions:
         raise MethodFailed(f"modes: mode {number}: {branch.message}")
     if branch.message:
-        reporter.warn(f"mode {number}: {branch.message}")
+        run.reporter.warn(f"mode {number}: {branch.message}")
     error = max(map(_error, branch.motions))
     if error > LARGEST_ERROR:
-        reporter.warn(
+        run.reporter.warn(
             f"mode {number} has an error of {error:.1e}: give a resolution.tolerance, or more "
             "resolution.harmonics and resolution.samples"
         )

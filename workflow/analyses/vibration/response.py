@@ -2,170 +2,113 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fe_models.dynamics.curves.followed_curve import curve_by_force, curve_by_frequency
-from fe_models.dynamics.curves.forced_response import (
-    ResponseBranch,
-    along_force,
-)
+from fe_models.dynamics.curves.forced_response import ResponseBranch, along_force
 from fe_models.dynamics.curves.further_branches import FurtherBranch
 from fe_models.dynamics.curves.phase_resonance import along_phase_resonance, curve_by_phase
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
-from sa_solver.steps import Steps
 from wear.contact.moving import LARGE_STROKE
 from wear.joints.periodic.march import SEPARATED, SLIP
-from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.model import accuracy_of, step_control, sweep_of
+from workflow.analyses.vibration.following import VibrationRun
+from workflow.analyses.vibration.model import sweep_of
 from workflow.analyses.vibration.output.harmonics import harmonics_of
 from workflow.analyses.vibration.output.loops import loops_of
-from workflow.analyses.vibration.output.outcome import DIAMETERS, RESONANCE, Curves, Response
+from workflow.analyses.vibration.output.outcome import Curves, Response
 from workflow.analyses.vibration.stability import stability_along
 from workflow.case.text.plain import shares
 from workflow.errors import MethodFailed
 from workflow.layout.declared import Arrays
-from workflow.models.vibration.motions import (
-    amplitude_of,
-    amplitudes_of,
-    motion_columns,
-    peaks_inside,
-)
+from workflow.models.vibration.motions import amplitudes_of, motion_columns, peaks_inside
 from workflow.models.vibration.results import LARGEST_ERROR, ForcedResponse
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.terminal.reporter import FORECAST, Reporter
+from workflow.shell.terminal.reporter import Reporter
 
-# Usual number of points of a curve while the frequency or the force grows by a factor of e. It
-# weighs as much as this known share of the curve in predictions.
-POINTS, BEGUN = 50, 0.2
 # Reason why a curve may end at a resonance.
 UNBOUNDED = "; without damping, resonances at which the joints do not resist are unbounded"
 
 
-def progress_along(
-    span: tuple[float, float], upward: bool, unit: str, reporter: Reporter
-) -> Callable[[float], None]:
-    """Return a callback that reports the progress of a curve along a ``span``, from its points.
-
-    The rest is assumed to have as many points per logarithm as the part behind. At the beginning,
-    the usual number counts. Points that turn back do not reduce the progress.
-    """
-    begin, end = span if upward else span[::-1]
-    length = abs(float(np.log(end / begin)))
-    points, farthest = 0, 0.0
-
-    @reporter.isolated(FORECAST)
-    def watch(parameter: float) -> None:
-        nonlocal points, farthest
-        points += 1
-        farthest = max(farthest, float(np.log(parameter / begin) / np.log(end / begin)))
-        density = (points + BEGUN * POINTS * length) / (farthest + BEGUN)
-        left = (1.0 - farthest) * density
-        reporter.reached(points / (points + left), f"{parameter:.4g} {unit}")
-
-    return watch
-
-
-def response_under(
-    case: VibrationCase, model: VibratingStructure, force: float, reporter: Reporter, steps: Steps
-) -> tuple[Response, ResponseBranch]:
+def response_under(run: VibrationRun, force: float) -> tuple[Response, ResponseBranch]:
     """Return the response under a force, and the branch of motions that it was taken from.
 
     Raises MethodFailed where there is no motion at all. A curve that ends before its span does
     gives a warning.
     """
-    sweep, reported = sweep_of(case), case.amount.as_text(force)
-    watch = progress_along(sweep.span, sweep.upward, "Hz", reporter)
-    branch = sweep.curve(model, force, steps, watch)
+    model, reporter = run.structure, run.reporter
+    sweep, reported = sweep_of(run.case), run.case.amount.as_text(force)
+    watch = run.progress(sweep.span, "Hz", sweep.upward)
+    branch = sweep.curve(model, force, run.steps, watch)
     if branch.message:
         unbounded = UNBOUNDED if model.undamped else ""
         reporter.warn(f"{reported}: {branch.message}{unbounded}")
-    stability = stability_along(
-        case,
-        model,
-        reported,
-        curve_by_frequency(branch.problem, force),
-        branch.solutions,
-        partial(amplitude_of, model),
-        reporter,
-        steps,
-    )
-    curves = {**curves_of(case, model, branch), **stability.columns}
+    curve = curve_by_frequency(branch.problem, force)
+    stability = stability_along(run, reported, curve, branch.solutions)
+    curves = {**curves_of(run, branch), **stability.columns}
     amplitudes = curves["amplitude"][:, -1]
     if not peaks_inside(amplitudes):
         reporter.warn(f"{reported}: no resonance, the largest motion is at an end of the curve")
     reporter.doing(f"{reported}: resonance")
-    resonance = sweep.resonance(model, branch, amplitudes, steps)
+    resonance = sweep.resonance(model, branch, amplitudes, run.steps)
     warn_of_stroke(model, f"{reported}: at resonance", resonance, reporter)
     found = ForcedResponse(branch, curves, resonance)
     response = Response(
         force,
         curves,
-        _numbers(case, model, found) | stability.numbers,
+        _numbers(run, found) | stability.numbers,
         nodes=_nodes(branch),
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
-        loops=loops_of(case, model, branch, reporter, steps),
-        harmonics={RESONANCE: harmonics_of(model.rig, resonance)},
+        loops=loops_of(run, branch),
+        harmonics={"resonance": harmonics_of(model.rig, resonance)},
         bifurcations=stability.bifurcations,
     )
-    warn_of_error(f"{reported}: the motion", response.numbers["error"], case, reporter)
+    warn_of_error(run, f"{reported}: the motion", response.numbers["error"])
     return response, branch
 
 
-def warn_of_error(motion: str, error: float, case: VibrationCase, reporter: Reporter) -> None:
+def warn_of_error(run: VibrationRun, motion: str, error: float) -> None:
     """Warn of a motion that is less accurate than the case asks for, or than any should be."""
-    tolerance = case.resolution.tolerance
+    tolerance = run.case.resolution.tolerance
     if tolerance is None and error > LARGEST_ERROR:
-        reporter.warn(
+        run.reporter.warn(
             f"{motion} has an error of {error:.1e}: give a resolution.tolerance, or more "
             "resolution.harmonics and resolution.samples"
         )
     if tolerance is not None and error > tolerance:
-        reporter.warn(
+        run.reporter.warn(
             f"{motion} has an error of {error:.1e} at the finest resolution, above "
             f"resolution.tolerance {tolerance:g}"
         )
 
 
-def force_sweep(
-    case: VibrationCase,
-    model: VibratingStructure,
-    frequency: float,
-    reporter: Reporter,
-    steps: Steps,
-) -> Curves:
+def force_sweep(run: VibrationRun, frequency: float) -> Curves:
     """Return the motions at a frequency from the least force of a case to the largest.
 
     Raises MethodFailed where there is none under the least force. A curve that ends before the
     largest force gives a warning.
     """
-    span = case.amounts[0], case.amounts[-1]
-    control = step_control(case, progress_along(span, True, case.amount.unit, reporter))
+    amount = run.case.amount
     branch = along_force(
-        model.problem, frequency, span, control=control, accuracy=accuracy_of(case), steps=steps
+        run.structure.problem,
+        frequency,
+        run.amounts,
+        control=run.control(run.amounts, amount.unit),
+        accuracy=run.accuracy,
+        steps=run.steps,
     )
     if not branch.solutions:
         raise MethodFailed(f"no motion at {frequency:g} Hz: {branch.message}; change force_sweeps")
     if branch.message:
-        reporter.warn(f"{frequency:g} Hz, along the {case.amount.name}: {branch.message}")
-    stability = stability_along(
-        case,
-        model,
-        f"{frequency:g} Hz",
-        curve_by_force(branch.problem, frequency),
-        branch.solutions,
-        partial(amplitude_of, model),
-        reporter,
-        steps,
-    )
-    curves = curves_of(case, model, branch)
+        run.reporter.warn(f"{frequency:g} Hz, along the {amount.name}: {branch.message}")
+    curve = curve_by_force(branch.problem, frequency)
+    stability = stability_along(run, f"{frequency:g} Hz", curve, branch.solutions)
+    curves = curves_of(run, branch)
     shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
     arrays = {
-        case.amount.name: branch.forces,
+        amount.name: branch.forces,
         "amplitude": curves["amplitude"][:, -1],
         **{name: curves[name] for name in shared},
         **stability.columns,
@@ -176,36 +119,26 @@ def force_sweep(
     return Curves(arrays, numbers | stability.numbers, stability.bifurcations)
 
 
-def backbone_of(
-    case: VibrationCase,
-    model: VibratingStructure,
-    branch: ResponseBranch,
-    reporter: Reporter,
-    steps: Steps,
-) -> Curves | None:
+def backbone_of(run: VibrationRun, branch: ResponseBranch) -> Curves | None:
     """Return the curve of phase resonance through all forces, from motions under one of them."""
-    span = case.amounts[0], case.amounts[-1]
-    control = step_control(case, progress_along(span, True, case.amount.unit, reporter))
+    model, amount = run.structure, run.case.amount
     backbone = along_phase_resonance(
-        model.problem, branch, span, control=control, accuracy=accuracy_of(case), steps=steps
+        model.problem,
+        branch,
+        run.amounts,
+        control=run.control(run.amounts, amount.unit),
+        accuracy=run.accuracy,
+        steps=run.steps,
     )
     if backbone.message:
-        reporter.warn(f"backbone: {backbone.message}")
+        run.reporter.warn(f"backbone: {backbone.message}")
     if not backbone.solutions:
         return None
-    stability = stability_along(
-        case,
-        model,
-        "backbone",
-        curve_by_phase(backbone.problem, backbone.solutions[0]),
-        backbone.solutions,
-        partial(amplitude_of, model),
-        reporter,
-        steps,
-    )
+    curve = curve_by_phase(backbone.problem, backbone.solutions[0])
+    stability = stability_along(run, "backbone", curve, backbone.solutions)
     columns = motion_columns(model, backbone.problem, backbone.solutions)
     arrays = {
-        case.amount.name: backbone.forces,
+        amount.name: backbone.forces,
         "frequency": backbone.frequencies,
         "amplitude": columns["amplitude"][:, -1],
         **{name: columns[name] for name in ("damping", "energy_per_cycle", "slip")},
@@ -215,11 +148,9 @@ def backbone_of(
     return Curves(arrays, numbers, stability.bifurcations)
 
 
-def _numbers(
-    case: VibrationCase, model: VibratingStructure, found: ForcedResponse
-) -> dict[str, Any]:
+def _numbers(run: VibrationRun, found: ForcedResponse) -> dict[str, Any]:
     """Return numbers of the response to a force, for the summary."""
-    branch, resonance = found.branch, found.resonance
+    branch, resonance, model = found.branch, found.resonance, run.structure
     amplitudes, resolution = amplitudes_of(model, resonance), resonance.resolution
     return {
         "resonance": resonance.frequency,
@@ -236,15 +167,14 @@ def _numbers(
         "harmonics": list(resolution.harmonics),
         "samples": resolution.samples,
         "message": branch.message,
-        **_beside(case, model, resonance),
+        **_beside(run, resonance),
     }
 
 
-def _beside(
-    case: VibrationCase, model: VibratingStructure, resonance: HarmonicSolution
-) -> dict[str, Any]:
+def _beside(run: VibrationRun, resonance: HarmonicSolution) -> dict[str, Any]:
     """Return numbers that only a moving ground, an engine or a ring has."""
     numbers: dict[str, Any] = {}
+    case, model = run.case, run.structure
     if model.driving.ground:
         absolute = amplitudes_of(model, model.driving.absolute(resonance))
         numbers["absolute_amplitude"] = float(absolute[-1])
@@ -252,18 +182,16 @@ def _beside(
         numbers["speed"] = case.turning * resonance.frequency
     if model.rig.sector is not None:
         ring, harmonics = model.rig.sector.ring, resonance.resolution.harmonics
-        numbers[DIAMETERS] = [ring.diameters(harmonic) for harmonic in harmonics]
+        numbers["nodal_diameters"] = [ring.diameters(harmonic) for harmonic in harmonics]
     return numbers
 
 
-def curves_of(
-    case: VibrationCase, model: VibratingStructure, branch: ResponseBranch | FurtherBranch
-) -> Arrays:
+def curves_of(run: VibrationRun, branch: ResponseBranch | FurtherBranch) -> Arrays:
     """Return results of structure and joints along a branch, over the frequency."""
     frequencies = {"frequency": branch.frequencies}
-    if case.engine_order is not None:
-        frequencies["speed"] = case.turning * branch.frequencies
-    return {**frequencies, **motion_columns(model, branch.problem, branch.solutions)}
+    if run.case.engine_order is not None:
+        frequencies["speed"] = run.case.turning * branch.frequencies
+    return {**frequencies, **motion_columns(run.structure, branch.problem, branch.solutions)}
 
 
 def _nodes(branch: ResponseBranch) -> Arrays:

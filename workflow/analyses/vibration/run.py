@@ -14,6 +14,7 @@ from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
 from workflow.analyses.vibration.answers import answers_under
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
+from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.further import further_from
 from workflow.analyses.vibration.model import (
     contact_at_rest,
@@ -23,13 +24,7 @@ from workflow.analyses.vibration.model import (
 )
 from workflow.analyses.vibration.modes import mode_of, refuse_missing_modes
 from workflow.analyses.vibration.output.harmonics import harmonics_along, names_of
-from workflow.analyses.vibration.output.outcome import (
-    CURVE,
-    Curves,
-    Response,
-    VibrationOutcome,
-    trend,
-)
+from workflow.analyses.vibration.output.outcome import Curves, Response, VibrationOutcome, trend
 from workflow.analyses.vibration.output.results import write_vibration_output
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.stability import looked_for
@@ -77,33 +72,33 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     numbered = () if case.modes is None else case.modes.numbers
     count = len(case.amounts) + case.backbone + len(case.force_sweeps) + len(numbered)
     curves = _Curves(count, reporter, growing=case.resolution.tolerance is not None)
+    following = VibrationRun(case, model, reporter, steps)
     with reporter.course("vibration"):
         for force in case.amounts:
             with curves.next(case.amount.as_text(force)), reporter.stage("response"):
-                response, branch = response_under(case, model, force, reporter, steps)
-                answers, of_answers = answers_under(case, model, branch, reporter, steps)
+                response, branch = response_under(following, force)
+                answers, of_answers = answers_under(following, branch)
                 harmonics = {**response.harmonics, **of_answers}
                 if case.harmonics_along_curves:
-                    harmonics[CURVE] = harmonics_along(model.rig, branch, reporter)
+                    harmonics["curve"] = harmonics_along(model.rig, branch, reporter)
             responses.append(replace(response, answers=answers, harmonics=harmonics))
             known: list[ResponseBranch | FurtherBranch] = [branch]
             for start in (start for start in case.further_branches if start.force == force):
                 with reporter.stage("further branches"):
-                    for other, found in further_from(case, model, start, known, reporter, steps):
+                    for other, found in further_from(following, start, known):
                         known.append(other)
                         further.append(found)
             if case.backbone and backbone is None:
                 # The backbone starts from the least force that has a phase resonance.
                 with curves.next("backbone"), reporter.stage("backbone"):
-                    backbone = backbone_of(case, model, branch, reporter, steps)
+                    backbone = backbone_of(following, branch)
         for frequency in case.force_sweeps:
             with curves.next(f"{frequency:g} Hz"), reporter.stage("force sweep"):
-                sweeps.append(force_sweep(case, model, frequency, reporter, steps))
+                sweeps.append(force_sweep(following, frequency))
         for number in numbered:
             with curves.next(f"mode {number}"), reporter.stage("mode"):
                 # Use as many harmonics as the largest force needed.
-                found = mode_of(case, number, model, branch.problem, reporter, steps)
-                modes.append(found)
+                modes.append(mode_of(following, number, branch.problem))
     return VibrationOutcome(
         case,
         model.rig.labels,

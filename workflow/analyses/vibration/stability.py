@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -13,12 +13,13 @@ from fe_models.dynamics.curves.bifurcations import Bifurcation, find_bifurcation
 from fe_models.dynamics.curves.followed_curve import FollowedCurve
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.stability.floquet import Floquet, Stability
-from sa_solver.steps import Steps
 from sa_solver.types import Array
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
+from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.layout import bifurcation_columns
 from workflow.layout.declared import Arrays
 from workflow.models.vibration.amount import ExcitationSize
+from workflow.models.vibration.motions import amplitude_of
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import Reporter
 
@@ -54,21 +55,12 @@ def looked_for(case: VibrationCase, model: VibratingStructure) -> bool:
 
 
 def stability_along(
-    case: VibrationCase,
-    model: VibratingStructure,
-    name: str,
-    curve: FollowedCurve[Any],
-    motions: Sequence[HarmonicSolution],
-    amplitude: Callable[[HarmonicSolution], float],
-    reporter: Reporter,
-    steps: Steps,
+    run: VibrationRun, name: str, curve: FollowedCurve[Any], motions: Sequence[HarmonicSolution]
 ) -> CurveStability:
-    """Return the stability of motions along a curve of this ``name``, and its bifurcations.
-
-    ``amplitude`` returns the amplitude of a motion [mm], which is reported with bifurcations.
-    """
-    if not looked_for(case, model):
+    """Return the stability of motions along a curve of this ``name``, and its bifurcations."""
+    if not looked_for(run.case, run.structure):
         return NOT_LOOKED_FOR
+    reporter, steps = run.reporter, run.steps
     reporter.doing(f"{name}: stability")
     floquet = Floquet(curve.problem)
     known: list[Stability] = []
@@ -78,7 +70,7 @@ def stability_along(
 
     def find() -> tuple[dict[str, Any], ...]:
         found = find_bifurcations(curve, motions, known)
-        return tuple(_described(each, amplitude(each.motion), case.amount) for each in found)
+        return tuple(_described(run, each) for each in found)
 
     bifurcations = steps("bifurcations", find)
     _warn_of_folds(name, bifurcations, reporter)
@@ -132,16 +124,14 @@ def _columns(known: Sequence[Stability]) -> Arrays:
     }
 
 
-def _described(
-    bifurcation: Bifurcation, amplitude: float, amount: ExcitationSize
-) -> dict[str, Any]:
+def _described(run: VibrationRun, bifurcation: Bifurcation) -> dict[str, Any]:
     """Return a bifurcation with the amplitude of its motion [mm], for summary and tables."""
     motion, multiplier = bifurcation.motion, bifurcation.multiplier
     return {
         "kind": bifurcation.kind,
         "frequency": motion.frequency,
-        amount.name: motion.force,
-        "amplitude": amplitude,
+        run.case.amount.name: motion.force,
+        "amplitude": amplitude_of(run.structure, motion),
         "multiplier": abs(multiplier),
         "multiplier_angle": float(abs(np.angle(multiplier))),
         "unstable_before": bifurcation.unstable[0],

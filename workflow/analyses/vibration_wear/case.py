@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -29,7 +28,7 @@ from workflow.analyses.vibration_wear.node_contacts import NodeContacts, PadCont
 from workflow.analyses.wear.case.sections import Cycles, Laws, TwoBodies
 from workflow.analyses.wear.case.worn_bodies import BodyWear, wearing
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, Reciprocation
-from workflow.case.fields import Quantity
+from workflow.case.fields import Ascending, Quantity
 from workflow.case.loading import YAML, CaseFile, load_case, outline_of
 from workflow.case.sections import Section, Title, disagreement, entry, in_its_place, one_of
 from workflow.case.source import Source
@@ -88,17 +87,13 @@ class WearByVibration(Section):
     force: DrivingForce | None = entry("amplitude [N]", "40 N", default=None)
     level: Level | None = entry("factor of the excitation, instead of force [1]", 1, default=None)
     frequency: Frequency = entry("frequency of the force [Hz]", "100 Hz")
-    cycles: Annotated[tuple[Cycles, ...], Field(min_length=1, max_length=100)] = entry(
+    cycles: Annotated[
+        tuple[Cycles, ...], Field(min_length=1, max_length=100), Ascending("ascending numbers")
+    ] = entry(
         "numbers of cycles at which states are reported, ascending; the contact is first "
         "reported unworn [1]",
         [1000, 100_000],
     )
-
-    @model_validator(mode="after")
-    def _ascending(self) -> WearByVibration:
-        if any(after <= before for before, after in pairwise(self.cycles)):
-            raise disagreement("not ascending; allowed: ascending numbers", "cycles")
-        return self
 
     @property
     def where(self) -> str:

@@ -23,14 +23,11 @@ from wear.steps.steppers import first_cycles
 from wear.steps.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.vibration.case.load import driving_of
+from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.loops import closed
 from workflow.analyses.vibration.output.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.output.outcome import (
-    CONTACT,
-    HALF_SPACE,
-    LOOP,
-    SLIDERS,
     VibrationWearOutcome,
     WornRig,
     step_error,
@@ -119,7 +116,8 @@ class _Description:
         model = VibratingStructure(
             rig, Jenkins(stiffness, friction, load), problem, self.contact.driving
         )
-        error, responses = responses_to_all(case, model, cycle.motion, self.reporter, self.steps)
+        run = VibrationRun(case, model, self.reporter, self.steps)
+        error, responses = responses_to_all(run, cycle.motion)
         return error, responses, {"free": rig.free(), **rig.modes(model.law)}
 
     def _numbers(self, cycle: ContactCycle) -> dict[str, Any]:
@@ -169,10 +167,10 @@ def _fields(cycle: ContactCycle, loop: TangentialLoop) -> dict[str, Arrays]:
     displacement, force = loop.cycle
     moved, pulled = cycle.displacement, cycle.motion.cycle.samples[:, 0, 0]
     return {
-        CONTACT: _contact_fields(cycle),
-        SLIDERS: _sliders(cycle),
-        LOOP: {"displacement": closed(moved), "force": closed(pulled)},
-        HALF_SPACE: {"displacement": displacement, "force": force},
+        "contact": _contact_fields(cycle),
+        "sliders": _sliders(cycle),
+        "loop": {"displacement": closed(moved), "force": closed(pulled)},
+        "half_space_loop": {"displacement": displacement, "force": force},
     }
 
 

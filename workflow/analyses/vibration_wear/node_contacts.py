@@ -16,7 +16,7 @@ from workflow.analyses.wear.case.sections import PressingForce
 from workflow.case.fields import File, Quantity, shown
 from workflow.case.files.input_files import InputFileError
 from workflow.case.files.table_file import TableFile, read_table_file
-from workflow.case.sections import disagreement, entry
+from workflow.case.sections import at_entry, disagreement, entry
 from workflow.errors import EntryError
 
 WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
@@ -113,10 +113,8 @@ class NodeContacts(PadContacts):
     def _has_areas(self) -> NodeContacts:
         by_node = table = None
         if self.nodes is not None:
-            try:
+            with at_entry("nodes"):
                 table = read_nodes(self.nodes)
-            except InputFileError as error:
-                raise disagreement(str(error), "nodes") from error
             by_node = table.area
         if self.area is None and by_node is None:
             wanted = "area of all contacts together" + ("" if table else ", or nodes")

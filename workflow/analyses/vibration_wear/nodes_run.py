@@ -18,7 +18,7 @@ from wear.laws import WearLaw
 from wear.steps.steppers import HeunStepper
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.analyses.vibration.case.vibration_case import VibrationCase
+from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.model import step_control, structure_numbers, vibration_model
 from workflow.analyses.vibration.output.loops import loop_of
 from workflow.analyses.vibration.output.outcome import Curves
@@ -30,9 +30,6 @@ from workflow.analyses.vibration_wear.case import (
     ReducedWearCase,
 )
 from workflow.analyses.vibration_wear.output.outcome import (
-    LOOP,
-    NODES,
-    POSITION,
     VibrationWearOutcome,
     WornNodes,
     WornRig,
@@ -61,8 +58,9 @@ def wear_nodes(
         pads.at(state)
 
     def describe(state: NodalState, cycles: float, taken: int) -> WornRig:
-        reached = cycles, taken
-        worn = _worn_state(case.unworn, pads.at(state), state, reached, reporter, steps)
+        cycle = pads.at(state)
+        run = VibrationRun(case.unworn, cycle.model, reporter, steps)
+        worn = _worn_state(run, cycle, state, cycles, taken)
         if worn.numbers["step_error"] > wear.tolerance:
             reporter.warn(
                 f"{cycles:g} cycles: wear steps cause an error of "
@@ -114,29 +112,21 @@ def _nodes(rig: RigModel) -> WornNodes:
         return WornNodes({**on_plane, "area": rig.area})
     bodies = {"normal": nodes.normals}
     if nodes.places is not None:
-        bodies[POSITION] = nodes.places
+        bodies["position"] = nodes.places
         if len(rig.places):
             bodies |= on_plane
     return WornNodes(bodies | {"area": rig.area}, nodes.names)
 
 
 def _worn_state(
-    case: VibrationCase,
-    cycle: PadCycle,
-    state: NodalState,
-    reached: tuple[float, int],
-    reporter: Reporter,
-    steps: Steps,
+    run: VibrationRun, cycle: PadCycle, state: NodalState, cycles: float, taken: int
 ) -> WornRig:
-    """Return the pads in a state.
-
-    ``reached`` is the number of cycles in all, and of wear steps since the last state.
-    """
-    cycles, taken = reached
-    loop = loop_of(cycle.model, cycle.motion, case.laws[0].normal_load)
-    error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
+    """Return the pads after a number of ``cycles``, ``taken`` wear steps after the last state."""
     problem, motion = cycle.model.problem, cycle.motion
-    warn_of_stroke(cycle.model, f"{cycles:g} cycles: in the motion that wears", motion, reporter)
+    loop = loop_of(cycle.model, motion, run.case.laws[0].normal_load)
+    error, responses = responses_to_all(run, motion)
+    at = f"{cycles:g} cycles: in the motion that wears"
+    warn_of_stroke(cycle.model, at, motion, run.reporter)
     depth = state.surfaces.depth
     numbers: dict[str, Any] = {
         "cycles": cycles,
@@ -157,7 +147,7 @@ def _worn_state(
         "error": error,
         **structure_numbers(cycle.model),
     }
-    reporter.log(
+    run.reporter.log(
         f"{cycles:g} cycles: {counted(taken, 'step')}, "
         f"{counted(numbers['touching'], 'node')} touching, stroke {numbers['stroke']:.4g} mm"
     )
@@ -167,7 +157,7 @@ def _worn_state(
 def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, Arrays]:
     depth_1, depth_2 = state.surfaces.depths
     return {
-        NODES: {
+        "nodes": {
             "gap": cycle.model.rig.gap,
             "depth_1": depth_1,
             "depth_2": depth_2,
@@ -175,5 +165,5 @@ def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, Array
             "path": cycle.path,
             "energy": cycle.energy,
         },
-        LOOP: {name: loop.arrays[name] for name in ("displacement", "force")},
+        "loop": {name: loop.arrays[name] for name in ("displacement", "force")},
     }

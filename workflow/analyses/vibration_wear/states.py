@@ -19,11 +19,10 @@ from wear.coupled_state import CoupledState, Observer
 from wear.schedule import Schedule
 from wear.steps.steppers import Contact, Stepper
 from wear.worn import State
-from workflow.analyses.vibration.case.vibration_case import VibrationCase
+from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.outcome import Response
 from workflow.analyses.vibration.response import response_under, warn_of_error
 from workflow.analyses.vibration_wear.output.outcome import WornRig
-from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import Reporter
 
 # Share of the wear in the work for a state; the rest are the responses in it.
@@ -94,18 +93,15 @@ def worn_states(
 
 
 def responses_to_all(
-    case: VibrationCase,
-    model: VibratingStructure,
-    motion: HarmonicSolution,
-    reporter: Reporter,
-    steps: Steps,
+    run: VibrationRun, motion: HarmonicSolution
 ) -> tuple[float, tuple[Response, ...]]:
     """Return the error of the ``motion`` that wears, and the responses to each force."""
-    error = resolution_error(model.problem.with_resolution(motion.resolution), motion).largest
-    warn_of_error("the motion that wears", error, case, reporter)
-    with reporter.stage("response"):
+    problem = run.structure.problem.with_resolution(motion.resolution)
+    error = resolution_error(problem, motion).largest
+    warn_of_error(run, "the motion that wears", error)
+    with run.reporter.stage("response"):
         responses = [
-            response_under(case, model, force, reporter, steps)[0]
-            for force in reporter.parts(case.amounts, case.amount.as_text)
+            response_under(run, force)[0]
+            for force in run.reporter.parts(run.case.amounts, run.case.amount.as_text)
         ]
     return error, tuple(responses)

@@ -135,18 +135,23 @@ def read_heights(file: str) -> Array:
     A list is one column. Raises InputFileError.
     """
     heights = _read_csv(file) if file.endswith(".csv") else read_array(file)
-    if heights.dtype.kind not in "iuf" or heights.ndim not in (1, 2) or heights.size == 0:
-        raise InputFileError(
-            f"{file}: {heights.ndim} dimensions of type {heights.dtype}; "
-            "allowed: numbers in rows along x and columns along y"
-        )
-    heights = heights.reshape(len(heights), -1).astype(np.float64)
+    heights = in_rows(file, heights)
     if not np.all(np.isfinite(heights)):
         row, column = np.argwhere(~np.isfinite(heights))[0] + 1
         raise InputFileError(
             f"{file}: row {row}, column {column}: not a finite number; allowed: a height per cell"
         )
     return heights
+
+
+def in_rows(file: str, heights: np.ndarray) -> Array:
+    """Return heights ``(nx, ny)``, a list as one column; raise InputFileError for other arrays."""
+    if heights.dtype.kind not in "iuf" or heights.ndim not in (1, 2) or heights.size == 0:
+        raise InputFileError(
+            f"{file}: {heights.ndim} dimensions of type {heights.dtype}; "
+            "allowed: numbers in rows along x and columns along y"
+        )
+    return heights.reshape(len(heights), -1).astype(np.float64)
 
 
 def read_array(file: str) -> np.ndarray:

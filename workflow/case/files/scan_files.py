@@ -23,6 +23,7 @@ from workflow.case.files.input_files import (
     InputFileError,
     check_widths,
     csv_rows,
+    in_rows,
     number_in,
     read_array,
     text_of,
@@ -101,13 +102,7 @@ def _bare(file: str, heights: Array, unit: str | None, pitch: tuple[float, float
         raise InputFileError(
             f"{file}: bare heights do not state their {missing}; allowed: state both with the file"
         )
-    if heights.dtype.kind not in "iuf" or heights.ndim not in (1, 2) or heights.size == 0:
-        raise InputFileError(
-            f"{file}: {heights.ndim} dimensions of type {heights.dtype}; "
-            "allowed: numbers in rows along x and columns along y"
-        )
-    rows = heights.reshape(len(heights), -1)
-    return Scan(rows.astype(np.float64) * to_base(f"1 {unit}", "mm"), pitch)
+    return Scan(in_rows(file, heights) * to_base(f"1 {unit}", "mm"), pitch)
 
 
 def _check_own_units(file: str, unit: str | None, pitch: tuple[float, float] | None) -> None:

@@ -81,6 +81,14 @@ class TableFile:
                 f"allowed: {allowed}"
             )
 
+    def require_unit(self, name: str, example: str) -> None:
+        """Raise InputFileError for a column without a unit, with an ``example`` of one."""
+        if not self.unit(name):
+            raise InputFileError(
+                f"{self.place}: {shown(name)}: no unit; allowed: one in brackets, such as "
+                f"{name} [{example}]"
+            )
+
     def cells(self, name: str) -> list[str]:
         """Return the texts of an existing column, as they are written."""
         place = self.names.index(name)

@@ -39,6 +39,15 @@ def listed(things: Sequence[str]) -> str:
     return f"{', '.join(before)} and {last}" if before else last
 
 
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return the rows of a table as lines, with columns as wide as their longest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
 def between(low: float, high: float, unit: str | None) -> str:
     """Return a range as text, both numbers in the unit of the larger one."""
     size, name = display_unit(max(low, high, key=abs), unit)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import h5py
 import numpy as np
 
 from sa_solver.types import Array
+from workflow.case.text.readable import suited
 from workflow.errors import UserError
+from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.quantities import ANY, LAST, CurvesOf
+from workflow.shell.output.tables import heading
 
 # Attributes of a numbered group that say in words what its number stands for.
 TELLING = {
@@ -32,6 +36,32 @@ class Curve:
     x_unit: str
     y_unit: str
     logarithmic: bool
+
+
+def axis_labels(curve: Curve, x_unit: str, y_unit: str) -> dict[str, str]:
+    """Return the labels of the axes of a curve in these units, as settings of matplotlib's axes."""
+    return {"xlabel": heading(curve.x_name, x_unit), "ylabel": heading(curve.y_name, y_unit)}
+
+
+def largest(*values: Array) -> float:
+    """Return the largest size of the finite values, 0 if there are none."""
+    finite = np.abs(np.concatenate([some[np.isfinite(some)] for some in values]))
+    return float(finite.max(initial=0.0))
+
+
+def suited_units(curves: Collection[Curve]) -> tuple[tuple[str, float], tuple[str, float]]:
+    """Return name and size of the units in which to draw curves of equal units: of x and of y."""
+    first = next(iter(curves))
+    return (
+        suited(largest(*(curve.x for curve in curves)), first.x_unit),
+        suited(largest(*(curve.y for curve in curves)), first.y_unit),
+    )
+
+
+def curves_of_run(folder: Path, wanted: Sequence[CurvesOf]) -> list[Curve]:
+    """Return the curves of these descriptions in the results of a finished run."""
+    with h5py.File(OutputFolder(folder).results) as file:
+        return [curve for each in wanted for curve in curves_in(file, each)]
 
 
 def curves_in(file: h5py.File, wanted: CurvesOf) -> Iterator[Curve]:

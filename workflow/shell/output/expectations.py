@@ -39,10 +39,11 @@ def verdicts(case: Case, summary: Mapping[str, Any]) -> list[Verdict]:
 
     Raises QuantityError if the summary has no number for an expected quantity.
     """
-    return [_verdict(entry, summary) for entry in case.expect]
+    return [verdict_of(entry, summary) for entry in case.expect]
 
 
-def _verdict(entry: Expectation, summary: Mapping[str, Any]) -> Verdict:
+def verdict_of(entry: Expectation, summary: Mapping[str, Any]) -> Verdict:
+    """Compare one expectation with the summary. Raises QuantityError as :func:`verdicts`."""
     computed = required_number(summary, entry.quantity)
     (value, unit), (number, _) = (in_unit_of(entry.value, n) for n in (entry.value, computed))
     return Verdict(entry, value, number, unit, abs(number - value) / (abs(value) or 1.0))

@@ -165,11 +165,11 @@ def read_points(entry: Measured, x_unit: str, y_unit: str) -> MeasuredPoints:
         y = _listed("values", entry.values, y_unit)
         given = None
     else:
-        table = _table(entry, entry.file)
-        names = _headings(entry, table)
-        x = _with_unit(table, names[0], x_unit)
-        y = _with_unit(table, names[1], y_unit)
-        given = _with_unit(table, names[2], y_unit) if len(names) > 2 else None
+        at, values = entry.columns.at or "at", entry.columns.values or "values"
+        table = _table(entry, entry.file, at, values)
+        x, y = _with_unit(table, at, x_unit), _with_unit(table, values, y_unit)
+        deviations = f"{values}{OF_DEVIATIONS}"
+        given = _with_unit(table, deviations, y_unit) if deviations in table.names else None
     if entry.deviation is not None:
         given = np.full(y.size, _listed("deviation", (entry.deviation,), y_unit)[0])
     elif entry.relative_deviation is not None:
@@ -303,9 +303,9 @@ def _nearest(candidates: Array, value: float) -> float:
     return float(candidates[np.argmin(np.abs(candidates - value))])
 
 
-def _table(entry: Measured, file: str) -> TableFile:
-    table = read_table_file(file)
-    at, values, deviations = _called(entry)
+def _table(entry: Measured, file: str, at: str, values: str) -> TableFile:
+    """Return a table with places and values, whose deviations are not given twice."""
+    table, deviations = read_table_file(file), f"{values}{OF_DEVIATIONS}"
     table.require([at, values], "the headings that columns names, or at and values")
     if deviations in table.names and not (entry.deviation is entry.relative_deviation is None):
         raise InputFileError(
@@ -314,29 +314,11 @@ def _table(entry: Measured, file: str) -> TableFile:
     return table
 
 
-def _called(entry: Measured) -> tuple[str, str, str]:
-    """Return the headings of places, values and standard deviations."""
-    values = entry.columns.values or "values"
-    return entry.columns.at or "at", values, f"{values}{OF_DEVIATIONS}"
-
-
-def _headings(entry: Measured, table: TableFile) -> list[str]:
-    """Return those of these headings that a table contains."""
-    return [name for name in _called(entry) if name in table.names]
-
-
-def _numbers(table: TableFile, name: str, base: str) -> Array:
+def _with_unit(table: TableFile, name: str, base: str) -> Array:
+    if base not in ("", "1"):
+        table.require_unit(name, base)
     above = 0.0 if name.endswith(OF_DEVIATIONS) else -np.inf
     return table.column(name, Quantity(base or table.unit(name) or "1", above=above))
-
-
-def _with_unit(table: TableFile, name: str, base: str) -> Array:
-    if base not in ("", "1") and not table.unit(name):
-        raise InputFileError(
-            f"{table.place}: {shown(name)}: no unit; allowed: one in brackets, such as "
-            f"{name} [{base}]"
-        )
-    return _numbers(table, name, base)
 
 
 def _listed(key: str, numbers: Sequence[float], base: str) -> Array:

@@ -19,6 +19,7 @@ from workflow.layout.declared import Arrays, Layout
 from workflow.shell.analysis import Run
 from workflow.shell.folders.store import replacing_hdf5
 from workflow.shell.folders.versions import versions
+from workflow.shell.output.tables import write_curves
 
 # Datasets with more values than this are compressed.
 LARGE = 4096
@@ -64,6 +65,11 @@ class ResultsWriter:
         for name in arrays:
             if declared[name].dims != (name,):
                 self._label(place, name, declared[name].dims)
+
+    def put_table(self, path: Path, group: str, arrays: Arrays, /, **attributes: Any) -> None:
+        """Write curves to a group, as :meth:`put` does, and as a CSV table."""
+        self.put(group, arrays, **attributes)
+        write_curves(path, arrays, self._layout.datasets(group))
 
     def _label(self, place: h5py.Group, name: str, dims: tuple[str, ...]) -> None:
         """Attach the scales of its dimensions to a dataset."""

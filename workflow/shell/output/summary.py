@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from itertools import chain
 from typing import Any
@@ -48,6 +49,11 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     longest = sorted(seconds.items(), key=lambda item: -item[1])[:MOST_STAGES]
     most = ", ".join(f"{name} {value:.1f}" for name, value in longest)
     reporter.say(f"  took {reporter.elapsed:.1f} s, most of it: {most}")
+
+
+def finite(value: float) -> float | None:
+    """Return a finite value, or None, because JSON has no infinity."""
+    return value if math.isfinite(value) else None
 
 
 class QuantityError(ValueError):

@@ -39,6 +39,14 @@ def console() -> Console:
     return Console(stderr=True, highlight=False, force_jupyter=False)
 
 
+def tables_console(file_width: int) -> Console:
+    """Return a console on stdout for tables, of ``file_width`` columns if it is no terminal."""
+    stdout = Console(highlight=False, markup=False)
+    if not stdout.is_terminal:
+        stdout.width = file_width
+    return stdout
+
+
 class ProgressRow:
     """Row of one task, with its progress as a bar and in words."""
 

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
@@ -29,7 +28,14 @@ from workflow.pictures.fields import (
     scaled_panels,
     view_of,
 )
-from workflow.pictures.panels import Figures, legend_below, new_figure, shaded, spread
+from workflow.pictures.panels import (
+    Figures,
+    legend_below,
+    legend_of_colours,
+    new_figure,
+    shaded,
+    spread,
+)
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE
 from workflow.shell.output.results import grid_of, own
@@ -59,13 +65,13 @@ def profiles(file: h5py.File) -> Figure:
     """Draw pressure and any shear along x through the centre, at turning points of the path."""
     names = _shown(file)
     along = _main_shear(file, names)
-    sheared = any(file["contact"][BODIES][name]["shear"][along].any() for name in names)
+    sheared = any(_states(file)[name]["shear"][along].any() for name in names)
     last = _last_touching(file)
     figure = new_figure(_profile_title(file, last), 9.5 if sheared else 5.5)
     axes = figure.subplots(1 + sheared, 1, sharex=True, squeeze=False)[:, 0]
     x = centres(_grid(file), 0)
     for (name, colour), dashes in zip(shaded(names, MAX_PROFILES), DASHES, strict=False):
-        state = file["contact"][BODIES][name]
+        state = _states(file)[name]
         look = {"color": colour, "linestyle": dashes, "label": _loads(file, name)}
         fields = state["pressure"][()], state["shear"][along]
         for axis, field in zip(axes, fields, strict=False):
@@ -73,9 +79,9 @@ def profiles(file: h5py.File) -> Figure:
     place = "" if _grid(file).line else " at y = 0"
     axes[0].set(ylabel="pressure [MPa]", ylim=(0.0, None), title=f"pressure{place}")
     if sheared:
-        pressure = middle(file["contact"][BODIES][last]["pressure"][()], 0)
+        pressure = middle(_states(file)[last]["pressure"][()], 0)
         limit = float(file.attrs["friction"]) * pressure
-        label = f"±µp, {file['contact'][BODIES][last].attrs['increment']}"
+        label = f"±µp, {_states(file)[last].attrs['increment']}"
         axes[1].fill_between(x, -limit, limit, color="#BBBBBB", alpha=0.4, lw=0, label=label)
         component = "xy"[along]
         axes[1].set_ylabel(f"shear q{component} [MPa]")
@@ -86,7 +92,7 @@ def profiles(file: h5py.File) -> Figure:
 
 
 def _profile_title(file: h5py.File, name: str) -> str:
-    state = file["contact"][BODIES][name]
+    state = _states(file)[name]
     pressure, shear = state["pressure"][()].max(), np.hypot(*state["shear"][()]).max()
     text = f"Increment {state.attrs['increment']}: pressure at most {pressure:.4g} MPa"
     return f"{text}, shear {shear:.4g} MPa" if shear else text
@@ -94,7 +100,7 @@ def _profile_title(file: h5py.File, name: str) -> str:
 
 def _shown(file: h5py.File) -> list[str]:
     """Return names of the states to show: the turning points of the path, evenly chosen if many."""
-    names = list(file["contact"][BODIES])
+    names = list(_states(file))
     rows = file["history/increment"][()] - 1
     path = np.stack([file["path"][name][()][rows] for name in own(file["path"])], axis=1)
     steps = np.sign(np.diff(path, axis=0))
@@ -107,14 +113,14 @@ def _shown(file: h5py.File) -> list[str]:
 
 def _main_shear(file: h5py.File, names: list[str]) -> int:
     """Return the larger component of shear on the profile: 0 for x, 1 for y."""
-    fields = [file["contact"][BODIES][name]["shear"][()] for name in names]
+    fields = [_states(file)[name]["shear"][()] for name in names]
     largest = [max(np.abs(middle(field[axis], 0)).max() for field in fields) for axis in (0, 1)]
     return int(largest[1] > largest[0])
 
 
 def _loads(file: h5py.File, name: str) -> str:
     """Return the increment and the loads that are not 0, for a legend."""
-    increment = int(file["contact"][BODIES][name].attrs["increment"])
+    increment = int(_states(file)[name].attrs["increment"])
     history = file["history"]
     row = int(np.flatnonzero(history["increment"][()] == increment)[0])
     largest = max(np.abs(history[key][()]).max() for key in FORCES)
@@ -128,7 +134,7 @@ def _loads(file: h5py.File, name: str) -> str:
 
 def _view(file: h5py.File, names: list[str], margin: float = MARGIN) -> FaceWindow:
     """Return the region in contact at these states, with a margin."""
-    fields = [file["contact"][BODIES][name]["pressure"][()] for name in names]
+    fields = [_states(file)[name]["pressure"][()] for name in names]
     return view_of(fields, _grid(file), margin)
 
 
@@ -141,7 +147,7 @@ def maps(file: h5py.File) -> Figure:
     Without shear, only the pressure is drawn.
     """
     name = _last_touching(file)
-    state, grid, view = file["contact"][BODIES][name], _grid(file), _view(file, [name])
+    state, grid, view = _states(file)[name], _grid(file), _view(file, [name])
     pressure, shear = state["pressure"][()], state["shear"][()]
     turned = is_upright([view])
     height = view.size[not turned] / view.size[turned]
@@ -161,8 +167,8 @@ def maps(file: h5py.File) -> Figure:
 
 def _last_touching(file: h5py.File) -> str:
     """Return the name of the last state in contact, or of the last state if there is none."""
-    names = list(file["contact"][BODIES])
-    touching = [name for name in names if file["contact"][BODIES][name]["pressure"][()].any()]
+    names = list(_states(file))
+    touching = [name for name in names if _states(file)[name]["pressure"][()].any()]
     return (touching or names)[-1]
 
 
@@ -178,11 +184,7 @@ def _draw_regions(
     _draw_arrows(axis, state["shear"][()], grid, view, turned)
     stuck = np.count_nonzero(regions == 1.0) / max(int(np.count_nonzero(pressed)), 1)
     axis.set_title(f"shear on body 2: {percent(stuck)} of the contact sticks")
-    figure.legend(
-        handles=[Patch(color=STICK, label="stick"), Patch(color=SLIP, label="slip")],
-        loc="outside lower center",
-        ncols=2,
-    )
+    legend_of_colours(figure, {"stick": STICK, "slip": SLIP})
 
 
 def _draw_arrows(axis: Axes, shear: Array, grid: Grid, view: FaceWindow, turned: bool) -> None:
@@ -262,6 +264,11 @@ def _driven(history: h5py.Group) -> tuple[str, str]:
     return max(
         [pair for pair in shearing if work[pair] > 1e-6 * largest] or pairs, key=work.__getitem__
     )
+
+
+def _states(file: h5py.File) -> h5py.Group:
+    """Return the states of the computed increments."""
+    return file["contact"][BODIES]
 
 
 def _grid(file: h5py.File) -> Grid:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
 from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -12,7 +11,7 @@ from pydantic import Field, model_validator
 from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.bodies.point_body import PointBody
 from workflow.analyses.rig.bodies.ring import RingOfSectors
-from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
+from workflow.analyses.rig.excitation import DrivingForce, FrequencySpan, MassNumber
 from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
 from workflow.analyses.rig.plausibility import RIGID, about_matrices, about_modes
 from workflow.analyses.rig.structure import (
@@ -26,14 +25,19 @@ from workflow.analyses.rig.structure import (
 )
 from workflow.analyses.vibration.case.excitation import VibrationExcitation
 from workflow.analyses.vibration.case.sections import Continuation, MotionResolution
-from workflow.case.fields import Quantity
-from workflow.case.sections import Case, Title, disagreement, entry, one_of
+from workflow.case.fields import Ascending, Quantity
+from workflow.case.sections import Case, Title, disagreement, entry, in_its_place, one_of
 from workflow.case.source import Source
 from workflow.case.text.plain import shares
 from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
 
 if TYPE_CHECKING:
     from workflow.models.rig.rig_model import RigModel
+
+
+Forces = Annotated[
+    tuple[DrivingForce, ...], Field(min_length=1, max_length=100), Ascending("ascending forces")
+]
 
 
 class VibrationCaseBase(Case):
@@ -49,7 +53,7 @@ class VibrationCaseBase(Case):
     structure: RowOfMasses | ReducedBody | MatrixBody | PointBody | FrictionRig = entry(
         "structure that holds the joints"
     )
-    forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] | None = entry(
+    forces: Forces | None = entry(
         "amplitudes of the force, ascending, each followed through the frequencies [N]",
         ["10 N", "40 N"],
         default=None,
@@ -63,24 +67,14 @@ class VibrationCaseBase(Case):
         4,
         default=None,
     )
-    frequencies: tuple[Frequency, Frequency] = entry(
-        "lower and upper end [Hz]", ["20 Hz", "400 Hz"]
-    )
+    frequencies: FrequencySpan = entry("lower and upper end [Hz]", ["20 Hz", "400 Hz"])
     resolution: MotionResolution = entry("resolution of a period", default=MotionResolution())
     continuation: Continuation = entry("continuation of each curve", default=Continuation())
 
     @model_validator(mode="after")
-    def _ascending(self) -> VibrationCaseBase:
-        if any(after <= before for before, after in pairwise(self.forces or ())):
-            raise disagreement("not ascending; allowed: ascending forces", "forces")
-        if self.frequencies[0] >= self.frequencies[1]:
-            raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
-        return self
-
-    @model_validator(mode="after")
     def _wears_its_joint(self) -> VibrationCaseBase:
         if not self.mixes_laws:
-            refuse_own_joints(self.structure, "the contact that wears alone")
+            refuse_own_joints(self.structure)
         return self
 
     @model_validator(mode="after")
@@ -123,11 +117,15 @@ class VibrationCaseBase(Case):
         ring: RingOfSectors | None = None,
     ) -> RigModel | None:
         """Return the rig as far as it is known before a run, and refuse places it does not have."""
-        # Imported here, as it loads the modules that build the structure.
-        from workflow.analyses.vibration.case.places import check_places
+        # Imported here, as they load the modules that build the structure.
+        from workflow.analyses.rig.building import known_rig
+        from workflow.analyses.vibration.case.load import driving_of
 
-        highest, order = self.resolution.harmonics[-1], round(self.engine_order or 1)
-        return check_places(self.structure, self.excitation, highest, joint, mass, ring, order)
+        with in_its_place():
+            rig = known_rig(self.structure, joint, mass, ring, round(self.engine_order or 1))
+            if rig is not None:
+                driving_of(self.excitation, rig, self.resolution.harmonics[-1])
+        return rig
 
     @property
     def amount(self) -> ExcitationSize:

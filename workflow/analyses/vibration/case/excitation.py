@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ from pydantic import Field, model_validator
 
 from workflow.analyses.rig.excitation import DrivingForce
 from workflow.analyses.rig.places import NAMED, Direction, Moved
-from workflow.case.fields import File, Quantity, Whole
+from workflow.case.fields import Ascending, File, Quantity, Whole
 from workflow.case.files.input_files import InputFileError
 from workflow.case.files.table_file import read_table_file
 from workflow.case.sections import Section, Title, disagreement, entry
@@ -154,7 +153,9 @@ class VibrationExcitation(Section):
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("forces",)
 
-    levels: Annotated[tuple[Level, ...], Field(min_length=1, max_length=100)] = entry(
+    levels: Annotated[
+        tuple[Level, ...], Field(min_length=1, max_length=100), Ascending("ascending levels")
+    ] = entry(
         "factors of the whole excitation, ascending, each followed through the frequencies [1]",
         [1, 4],
         default=(1.0,),
@@ -169,8 +170,6 @@ class VibrationExcitation(Section):
     def _drives(self) -> VibrationExcitation:
         if not (self.forces or self.records or self.base):
             raise disagreement("nothing drives; allowed: forces, records or base", "forces")
-        if any(after <= before for before, after in pairwise(self.levels)):
-            raise disagreement("not ascending; allowed: ascending levels", "levels")
         return self
 
     @property

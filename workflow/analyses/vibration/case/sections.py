@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from workflow.analyses.rig.excitation import DrivingForce, Frequency
-from workflow.case.fields import Entry, Quantity, Whole
+from workflow.case.fields import Ascending, Entry, Quantity, Whole
 from workflow.case.sections import Section, disagreement, entry
 
 MOST_ODD, HIGHEST = 100, 999
@@ -171,16 +171,12 @@ class NonlinearModes(Section):
         [1],
         default=(1,),
     )
-    amplitudes: tuple[Amplitude, Amplitude] = entry(
-        "smallest and largest amplitude of the reported point [mm]", ["0.1 um", "20 um"]
-    )
+    amplitudes: Annotated[
+        tuple[Amplitude, Amplitude], Ascending("the smallest, then the largest")
+    ] = entry("smallest and largest amplitude of the reported point [mm]", ["0.1 um", "20 um"])
 
     @model_validator(mode="after")
-    def _ascends(self) -> NonlinearModes:
-        if self.amplitudes[0] >= self.amplitudes[1]:
-            raise disagreement(
-                "not ascending; allowed: the smallest, then the largest", "amplitudes"
-            )
+    def _names_modes_once(self) -> NonlinearModes:
         if len(set(self.numbers)) < len(self.numbers):
             raise disagreement("a mode twice; allowed: each once", "numbers")
         return self
@@ -198,6 +194,6 @@ class FurtherStart(Section):
 
     force: DrivingForce = entry("one of forces, or of the excitation's levels [N]", "40 N")
     frequency: Frequency = entry("frequency of motions that may be on the branch [Hz]", "200 Hz")
-    amplitude: Annotated[float, Quantity("mm", above=0.0, at_most=1e3)] = entry(
+    amplitude: Amplitude = entry(
         "rough amplitude of the reported point in such a motion [mm]", "50 um"
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, StrictBool, model_validator
@@ -29,6 +28,7 @@ from workflow.analyses.rig.structure import (
 )
 from workflow.analyses.vibration.case.case_base import DrivenMass, wears
 from workflow.analyses.vibration.case.sections import FurtherStart, LoopsAt, NonlinearModes
+from workflow.case.fields import Ascending
 from workflow.case.sections import disagreement, entry
 from workflow.case.source import Source
 
@@ -63,7 +63,9 @@ class VibrationCase(DrivenMass):
         ["100 Hz"],
         default=(),
     )
-    at: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
+    at: Annotated[
+        tuple[Frequency, ...], Field(max_length=100), Ascending("ascending frequencies")
+    ] = entry(
         "frequencies at which every motion under each force is computed [Hz]",
         ["100 Hz", "150 Hz"],
         default=(),
@@ -208,7 +210,6 @@ class VibrationCase(DrivenMass):
 
     @model_validator(mode="after")
     def _check_further_starts(self) -> VibrationCase:
-        low, high = self.frequencies
         for number, start in enumerate(self.further_branches):
             if start.force not in self.amounts:
                 allowed = ", ".join(map(self.amount.as_text, self.amounts))
@@ -217,13 +218,17 @@ class VibrationCase(DrivenMass):
                     f"{allowed}",
                     f"further_branches.{number}.force",
                 )
-            if not low <= start.frequency <= high:
-                raise disagreement(
-                    f"{start.frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
-                    f"{high:g} Hz",
-                    f"further_branches.{number}.frequency",
-                )
+            self._require_inside(start.frequency, f"further_branches.{number}.frequency")
         return self
+
+    def _require_inside(self, frequency: float, key: str) -> None:
+        """Refuse a frequency that the curves do not reach."""
+        low, high = self.frequencies
+        if not low <= frequency <= high:
+            raise disagreement(
+                f"{frequency:g} Hz: outside; allowed: within frequencies, {low:g} to {high:g} Hz",
+                key,
+            )
 
     @model_validator(mode="after")
     def _has_the_directions(self) -> VibrationCase:
@@ -258,19 +263,10 @@ class VibrationCase(DrivenMass):
     @model_validator(mode="after")
     def _looks_inside(self) -> VibrationCase:
         self._require_joints_of_loops()
-        low, high = self.frequencies
-        looked_at = {f"at.{place}": frequency for place, frequency in enumerate(self.at)}
+        for place, frequency in enumerate(self.at):
+            self._require_inside(frequency, f"at.{place}")
         if self.loops is not None:
-            looked_at["loops.frequency"] = self.loops.frequency
-        for key, frequency in looked_at.items():
-            if not low <= frequency <= high:
-                raise disagreement(
-                    f"{frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
-                    f"{high:g} Hz",
-                    key,
-                )
-        if any(after <= before for before, after in pairwise(self.at)):
-            raise disagreement("not ascending; allowed: ascending frequencies", "at")
+            self._require_inside(self.loops.frequency, "loops.frequency")
         return self
 
     @model_validator(mode="after")

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.vibration.output.outcome import MODES, VibrationContents
+from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, plain_ticks, spread
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE
@@ -32,7 +32,7 @@ def modes(file: h5py.File, contents: VibrationContents) -> Figure:
     figure = new_figure(_title(file, contents), 1.2 + ROW_HEIGHT * len(shown))
     panels = figure.subplots(len(shown), 2, squeeze=False, sharex="row")
     for row, group in zip(panels, shown, strict=True):
-        mode = file[MODES][group]
+        mode = file["modes"][group]
         for axis, (name, (factor, label)) in zip(row, QUANTITIES.items(), strict=True):
             size, values = TO_MICRONS * mode["amplitude"][()], factor * mode[name][()]
             if contents.backbone:
@@ -54,7 +54,7 @@ def modes(file: h5py.File, contents: VibrationContents) -> Figure:
 
 def _title(file: h5py.File, contents: VibrationContents) -> str:
     """Return a title on the first mode."""
-    first = file[MODES][contents.modes[0]].attrs
+    first = file["modes"][contents.modes[0]].attrs
     begin, end = first["frequency"]
     return (
         f"Mode {first['mode']}: {begin:.4g} Hz at the smallest amplitude, {end:.4g} at the "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import h5py
@@ -18,18 +17,19 @@ from workflow.analyses.vibration.figures.modes import modes
 from workflow.analyses.vibration.figures.ring import nodal_diameters
 from workflow.analyses.vibration.figures.shares import MOST_JOINTS, joint_states, node_shares
 from workflow.analyses.vibration.figures.stability import (
+    draw_amplitudes,
     draw_motions,
     explain_stability,
-    mark_bifurcations,
 )
 from workflow.analyses.vibration.figures.states import node_states, pad_states
-from workflow.analyses.vibration.output.outcome import AT, FURTHER, VibrationContents
+from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.pictures.panels import (
     Figures,
     legend_below,
     new_figure,
     plain_ticks,
+    present,
     shaded,
 )
 from workflow.pictures.scales import TO_MICRONS
@@ -63,9 +63,7 @@ def figures_of(contents: VibrationContents) -> Figures:
         "node_states": (node_states, contents.places),
         "pad_states": (pad_states, contents.places),
     }
-    return {
-        name: partial(draw, contents=contents) for name, (draw, there) in drawn.items() if there
-    }
+    return present(drawn, contents)
 
 
 def _shown(file: h5py.File, contents: VibrationContents) -> list[tuple[h5py.Group, Any]]:
@@ -105,18 +103,14 @@ def frequency_response(file: h5py.File, contents: VibrationContents) -> Figure:
         axis.plot(frequency, receptance, style, label=label, **LIMIT)
     for response, colour in _shown(file, contents):
         _, force = amount_in(response.attrs)
-        size = TO_MICRONS * response["amplitude"][:, -1]
         label = f"{load_text(response.attrs)}: {response.attrs['resonance']:.4g} Hz"
-        draw_motions(
-            axis, response, response["frequency"][()], size / force, color=colour, label=label
-        )
-        mark_bifurcations(axis, response, "frequency", TO_MICRONS / force, colour)
+        draw_amplitudes(axis, response, TO_MICRONS / force, color=colour, label=label)
         _draw_phase(phase, response, color=colour)
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
-        lows.append(size.min() / force)
+        lows.append(TO_MICRONS * response["amplitude"][:, -1].min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
         if contents.at:
-            asked = response[AT]
+            asked = response["at"]
             sizes = TO_MICRONS * asked["amplitude"][:, -1] / force
             axis.plot(asked["frequency"][()], sizes, "D", color=colour, **ASKED)
     drawn = [response for response, _ in _shown(file, contents)]
@@ -151,14 +145,14 @@ def _draw_further(
     amount = _amount_of(file).name
     colours = {response.attrs[amount]: colour for response, colour in _shown(file, contents)}
     branches = [
-        branch for branch in file.get(FURTHER, {}).values() if branch.attrs[amount] in colours
+        branch
+        for branch in file.get("further_branches", {}).values()
+        if branch.attrs[amount] in colours
     ]
     for branch in branches:
         force = float(branch.attrs[amount])
         factor, colour = TO_MICRONS / (1.0 if phase is None else force), colours[force]
-        size = factor * branch["amplitude"][:, -1]
-        draw_motions(axis, branch, branch["frequency"][()], size, color=colour, linewidth=1.4)
-        mark_bifurcations(axis, branch, "frequency", factor, colour)
+        draw_amplitudes(axis, branch, factor, color=colour, linewidth=1.4)
         if phase is not None:
             _draw_phase(phase, branch, color=colour, linewidth=1.4)
     return branches
@@ -212,19 +206,15 @@ def resonance(file: h5py.File, contents: VibrationContents) -> Figure:
 
 def _draw_amplitudes(axis: Axes, file: h5py.File, contents: VibrationContents) -> None:
     for response, colour in _shown(file, contents):
-        size = TO_MICRONS * response["amplitude"][:, -1]
         look = {"color": colour, "label": load_text(response.attrs), "linewidth": 1.4}
-        draw_motions(axis, response, response["frequency"][()], size, **look)
-        mark_bifurcations(axis, response, "frequency", TO_MICRONS, colour)
+        draw_amplitudes(axis, response, TO_MICRONS, **look)
     drawn = [response for response, _ in _shown(file, contents)]
     drawn += _draw_further(axis, file, contents)
     _over_frequency(axis, file)
     if contents.backbone:
         backbone = file["backbone"]
         look = {"color": BLACK, "label": "phase resonance", "zorder": 4, "linewidth": 1.0}
-        size = TO_MICRONS * backbone["amplitude"][()]
-        draw_motions(axis, backbone, backbone["frequency"][()], size, **look)
-        mark_bifurcations(axis, backbone, "frequency", TO_MICRONS, BLACK)
+        draw_amplitudes(axis, backbone, TO_MICRONS, **look)
         drawn.append(backbone)
     explain_stability(axis, drawn)
     axis.set_ylabel(f"amplitude of {_seen(file)} [µm]")

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from workflow.analyses.vibration.case.excitation import load_text
-from workflow.analyses.vibration.output.outcome import DIAMETERS, VibrationContents
+from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import legend_below, new_figure, whole_ticks
 from workflow.pictures.style import BLACK, BLUE, ORANGE
 
@@ -22,7 +22,7 @@ def nodal_diameters(file: h5py.File, contents: VibrationContents) -> Figure:
 
     The engine orders are those at the speed of the resonance.
     """
-    group = file[DIAMETERS]
+    group = file["nodal_diameters"]
     sectors, order = int(group.attrs["sectors"]), int(file.attrs["engine_order"])
     numbers = file["responses"][contents.responses[-1]].attrs
     resonance = float(numbers["resonance"])

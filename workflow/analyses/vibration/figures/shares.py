@@ -9,25 +9,24 @@ import h5py
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.vibration.case.excitation import amount_in, load_text, under_in
-from workflow.analyses.vibration.figures.stability import draw_motions
-from workflow.analyses.vibration.figures.states import (
-    COLUMNS,
-    KINDS,
-    MOST_TICKS,
-    kinds_of,
-    largest_at,
+from workflow.analyses.vibration.case.excitation import under_in
+from workflow.analyses.vibration.figures.columns import (
+    along,
+    by_distance,
+    draw_response,
+    label_columns,
+    mark_resonance,
+    shown_responses,
 )
+from workflow.analyses.vibration.figures.states import KINDS, kinds_of
 from workflow.analyses.vibration.output.outcome import VibrationContents
-from workflow.pictures.panels import new_figure, plain_ticks, spread, whole_ticks
-from workflow.pictures.scales import TO_MICRONS
-from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, ORANGE
+from workflow.pictures.panels import legend_of_colours, new_figure, whole_ticks
+from workflow.pictures.style import BLUE, COLOUR_MAP, ORANGE
 
-# Most columns of forces, and most rows of joints, that are still readable.
-MOST_FORCES, MOST_JOINTS = 3, 6
+# Most rows of joints that are still readable.
+MOST_JOINTS = 6
 TO_PERCENT = 1e2
 # States of a joint that fill the period, from the bottom of its panel.
 DOES = {"sticks or is closed": BLUE, "slips": ORANGE, "is open": "#B8B8B8"}
@@ -40,7 +39,7 @@ def joint_states(file: h5py.File, contents: VibrationContents) -> Figure:
 
     Joints that always stick, such as springs, are left out.
     """
-    names, shown = _names(file), _shown(file, contents)
+    names, shown = _names(file), shown_responses(file, contents)
     joints = _changing(shown)
     height = AROUND + RESPONSE + STRIP * len(joints)
     figure = new_figure(_most_slipping(shown, names), height)
@@ -52,22 +51,22 @@ def joint_states(file: h5py.File, contents: VibrationContents) -> Figure:
         height_ratios=(RESPONSE, *(STRIP,) * len(joints)),
     )
     for column, response in zip(panels.T, shown, strict=True):
-        _draw_response(column[0], response)
-        frequency, points = _along(response)
+        draw_response(column[0], response)
+        frequency, points = along(response)
         slip, apart = _shares(response, points)
         for joint, axis in zip(joints, column[1:], strict=True):
             _draw_stack(axis, frequency, [1.0 - slip - apart, slip, apart], joint)
-            _mark_resonance(axis, response)
-    _label(panels, shown[0])
+            mark_resonance(axis, response)
+    label_columns(panels, shown[0])
     for axis, joint in zip(panels[1:, 0], joints, strict=True):
         axis.set_ylabel(f"{names[joint]}\n[% of period]")
-    _legend(figure, DOES)
+    legend_of_colours(figure, DOES)
     return figure
 
 
 def node_shares(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw shares of the period in which many joints slip and are apart, and counts by state."""
-    shown = _shown(file, contents)
+    shown = shown_responses(file, contents)
     figure = new_figure(_most_at_once(shown), AROUND + RESPONSE + 2.0 * MAP + STRIP)
     panels = figure.subplots(
         *(4, len(shown)),
@@ -76,18 +75,21 @@ def node_shares(file: h5py.File, contents: VibrationContents) -> Figure:
         squeeze=False,
         height_ratios=(RESPONSE, MAP, MAP, STRIP),
     )
-    order, ticks, label = _order(file, contents)
+    order, ticks, label = np.arange(contents.joints), None, "joints by number"
+    if contents.places:
+        order, ticks = by_distance(file)
+        label = "distance from the middle [mm]"
     for column, response in zip(panels.T, shown, strict=True):
-        _draw_response(column[0], response)
-        frequency, points = _along(response)
+        draw_response(column[0], response)
+        frequency, points = along(response)
         for axis, shares in zip(column[1:3], _shares(response, points), strict=True):
             mesh = _draw_map(axis, frequency, shares[:, order])
         kinds = kinds_of(response)[points]
         counts = [(kinds == kind).mean(axis=1, keepdims=True) for kind in range(len(KINDS))]
         _draw_stack(column[3], frequency, counts, 0, tuple(KINDS.values()))
         for axis in column[1:]:
-            _mark_resonance(axis, response)
-    _label(panels, shown[0])
+            mark_resonance(axis, response)
+    label_columns(panels, shown[0])
     for axis, what in zip(panels[1:3, 0], ("slips", "apart"), strict=True):
         axis.set_ylabel(f"{what}\n{label}")
         if ticks:
@@ -96,12 +98,8 @@ def node_shares(file: h5py.File, contents: VibrationContents) -> Figure:
             whole_ticks(axis.yaxis)
     panels[3, 0].set_ylabel("[% of nodes]" if contents.places else "[% of joints]")
     figure.colorbar(mesh, ax=panels[1:3], label="share of the period [%]", aspect=40)
-    _legend(figure, KINDS)
+    legend_of_colours(figure, KINDS)
     return figure
-
-
-def _shown(file: h5py.File, contents: VibrationContents) -> list[h5py.Group]:
-    return [file["responses"][name] for name in spread(contents.responses, MOST_FORCES)]
 
 
 def _names(file: h5py.File) -> list[str]:
@@ -122,29 +120,9 @@ def _changing(shown: list[h5py.Group]) -> list[int]:
 # --- along the curve ----------------------------------------------------------------------------
 
 
-def _along(response: h5py.Group) -> tuple[Array, Indices]:
-    """Return edges of columns ``(c + 1,)`` over the frequency, and the largest motion in each."""
-    frequency = response["frequency"][()]
-    edges = np.geomspace(frequency.min(), frequency.max(), COLUMNS + 1)
-    middle = np.sqrt(edges[1:] * edges[:-1])
-    return edges, largest_at(frequency, response["amplitude"][:, -1], middle)
-
-
 def _shares(response: h5py.Group, points: Indices) -> tuple[Array, Array]:
     """Return shares of the period ``(c, j)`` in which joints slip, and are apart."""
     return response["nodes/slip"][()][points], response["nodes/separated"][()][points]
-
-
-def _draw_response(axis: Axes, response: h5py.Group) -> None:
-    _, force = amount_in(response.attrs)
-    size = TO_MICRONS * response["amplitude"][:, -1] / force
-    draw_motions(axis, response, response["frequency"][()], size, color=BLACK)
-    _mark_resonance(axis, response)
-    axis.set_title(f"{load_text(response.attrs)}: {response.attrs['resonance']:.4g} Hz")
-
-
-def _mark_resonance(axis: Axes, response: h5py.Group) -> None:
-    axis.axvline(response.attrs["resonance"], color=BLACK, linestyle=":", linewidth=1.2)
 
 
 def _draw_stack(
@@ -176,31 +154,6 @@ def _draw_map(axis: Axes, edges: Array, shares: Array) -> Any:
 # --- words --------------------------------------------------------------------------------------
 
 
-def _order(file: h5py.File, contents: VibrationContents) -> tuple[Indices, Any, str]:
-    """Return the joints from the bottom up, ticks for them, and a label of their order."""
-    if not contents.places:
-        return np.arange(contents.joints), None, "joints by number"
-    distance = np.hypot(file["contact/x"][()], file["contact/y"][()])
-    order = np.argsort(distance, kind="stable")
-    places = np.unique(np.linspace(0, len(order) - 1, MOST_TICKS).round().astype(int))
-    names = [f"{distance[order[place]]:.2g}" for place in places]
-    return order, (places + 0.5, names), "distance from the middle [mm]"
-
-
-def _label(panels: Any, response: h5py.Group) -> None:
-    """Set scales and labels that the panels of all forces share."""
-    amount, _ = amount_in(response.attrs)
-    top = panels[0, 0]
-    top.set(xscale="log", yscale="log")
-    top.set_ylabel(f"amplitude / {amount.name}\n[{amount.receptance[1]}]")
-    for axis in panels[-1]:
-        axis.set_xlabel("frequency [Hz]")
-    frequencies = response["frequency"][()]
-    top.set_xlim(frequencies.min(), frequencies.max())
-    for side in (panels[-1, 0].xaxis, top.yaxis):
-        plain_ticks(side)
-
-
 def _most_slipping(shown: list[h5py.Group], names: list[str]) -> str:
     """Return text on the joint that slips longest, or is apart longest where none slips."""
     response = shown[-1]
@@ -223,10 +176,3 @@ def _most_at_once(shown: list[h5py.Group]) -> str:
         texts.append(f"{(shares > 0.0).sum(axis=1).max()} {word}")
     count = shares.shape[1]
     return f"Of {count} joints at most {' and '.join(texts)} at times {under_in(shown[-1].attrs)}"
-
-
-def _legend(figure: Figure, colours: dict[str, str]) -> None:
-    patches = [Patch(facecolor=colour, label=name) for name, colour in colours.items()]
-    figure.legend(
-        handles=patches, loc="outside lower center", ncols=len(colours), columnspacing=1.2
-    )

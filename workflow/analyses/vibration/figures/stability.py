@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from sa_solver.types import Array
-from workflow.analyses.vibration.output.outcome import BIFURCATIONS
 from workflow.pictures.style import BLACK
 
 # Line styles by code of stability. Between two points, the smaller code counts.
@@ -41,6 +40,21 @@ def draw_motions(axis: Axes, group: h5py.Group, x: Array, y: Array, **look: Any)
             label = None
 
 
+def draw_amplitudes(axis: Axes, group: h5py.Group, factor: float, **look: Any) -> None:
+    """Draw the main observed amplitude times a ``factor`` over the frequency, as motions are.
+
+    Bifurcations are marked.
+    """
+    amplitude = group["amplitude"][()]
+    size = factor * (amplitude if amplitude.ndim == 1 else amplitude[:, -1])
+    draw_motions(axis, group, group["frequency"][()], size, **look)
+    if "bifurcations" in group:
+        found = group["bifurcations"]
+        places = zip(found["frequency"][()], factor * found["amplitude"][()], strict=True)
+        for kind, place in zip(found.attrs["kind"], places, strict=True):
+            axis.plot(*place, MARKS[kind][0], color=look["color"], **MARK)
+
+
 def _codes(group: h5py.Group) -> np.ndarray:
     """Return the codes of stability of the motions, empty if there is no such column."""
     return np.asarray(group["stability"][()]) if "stability" in group else np.zeros(0, int)
@@ -50,17 +64,6 @@ def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
     """Return first and past-the-last index of each run of true ``flags``."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
     return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def mark_bifurcations(axis: Axes, group: h5py.Group, x: str, factor: float, colour: Any) -> None:
-    """Mark bifurcations on the curve of a group, over ``x``: the amplitude times a factor."""
-    if BIFURCATIONS not in group:
-        return
-    found = group[BIFURCATIONS]
-    for kind, at, amplitude in zip(
-        found.attrs["kind"], found[x][()], found["amplitude"][()], strict=True
-    ):
-        axis.plot(at, factor * amplitude, MARKS[kind][0], color=colour, **MARK)
 
 
 def explain_stability(axis: Axes, groups: list[h5py.Group]) -> None:
@@ -73,8 +76,8 @@ def explain_stability(axis: Axes, groups: list[h5py.Group]) -> None:
     kinds = {
         kind
         for group in groups
-        if BIFURCATIONS in group
-        for kind in group[BIFURCATIONS].attrs["kind"]
+        if "bifurcations" in group
+        for kind in group["bifurcations"].attrs["kind"]
     }
     for kind, (mark, word) in MARKS.items():
         if kind in kinds:

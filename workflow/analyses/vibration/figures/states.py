@@ -9,18 +9,25 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.vibration.case.excitation import amount_in, load_text, under_in
+from workflow.analyses.vibration.case.excitation import load_text, under_in
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
+from workflow.analyses.vibration.figures.columns import (
+    along,
+    by_distance,
+    draw_response,
+    label_columns,
+    largest_at,
+    mark_resonance,
+    shown_responses,
+)
 from workflow.analyses.vibration.output.outcome import VibrationContents
-from workflow.pictures.panels import new_figure, plain_ticks, spread
-from workflow.pictures.scales import TO_MICRONS
-from workflow.pictures.style import BLACK, BLUE, ORANGE
+from workflow.pictures.panels import legend_of_colours, new_figure
+from workflow.pictures.style import BLUE, ORANGE
 
-# Most forces with readable maps: over frequency, and of the pad.
-MOST_MAPS, MOST_PADS = 3, 6
+# Most forces with readable maps of the pad.
+MOST_PADS = 6
 # States of a node in a cycle, numbered from 0, with colours (Okabe and Ito's, and greys).
 KINDS = {
     "sticks": BLUE,
@@ -38,12 +45,9 @@ CELLS: dict[str, Any] = {
 HALF = 0.5
 # Tolerance on shares of a cycle, for rounding.
 ROUNDING = 1e-9
-# Columns of a map over frequency: more than its pixels with three maps in a row.
-COLUMNS = 480
 # Frequencies of the maps of the pad, over that of the peak: an octave below and above, or the end
 # of the curve.
 OCTAVES = {"below": 0.5, "at the peak": 1.0, "above": 2.0}
-MOST_TICKS = 6
 # Heights of the margins of the maps of the pad, and of the maps [inch]. With more columns than
 # ``WIDE`` the maps are lower.
 AROUND_PADS, PAD_ROWS, WIDE = 2.4, 6.6, 4
@@ -51,36 +55,29 @@ AROUND_PADS, PAD_ROWS, WIDE = 2.4, 6.6, 4
 
 def node_states(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw the state of every node over frequency, below the response, under some forces."""
-    shown = [file["responses"][name] for name in spread(contents.responses, MOST_MAPS)]
+    shown = shown_responses(file, contents)
     figure = new_figure(_title(shown), 8.5)
     panels = figure.subplots(
         2, len(shown), sharex=True, sharey="row", squeeze=False, height_ratios=(1.0, 1.6)
     )
-    distance = np.hypot(file["contact/x"][()], file["contact/y"][()])
-    order = np.argsort(distance, kind="stable")
+    order, ticks = by_distance(file)
     for (top, bottom), response in zip(panels.T, shown, strict=True):
-        amount, force = amount_in(response.attrs)
-        receptance = TO_MICRONS * response["amplitude"][:, -1] / force
-        top.plot(response["frequency"][()], receptance)
-        _draw_over_frequency(bottom, response, order)
-        for axis in (top, bottom):
-            axis.axvline(response.attrs["resonance"], color=BLACK, linestyle=":", linewidth=1.2)
-        top.set_title(f"{load_text(response.attrs)}: {response.attrs['resonance']:.4g} Hz")
-        bottom.set_xlabel("frequency [Hz]")
-    over = f"amplitude / {amount.name} [{amount.receptance[1]}]"
-    panels[0, 0].set(xscale="log", yscale="log", ylabel=over)
-    for side in (bottom.xaxis, panels[0, 0].yaxis):
-        plain_ticks(side)
+        draw_response(top, response)
+        edges, points = along(response)
+        kinds = kinds_of(response)[points][:, order]
+        bottom.grid(visible=False)
+        bottom.pcolormesh(edges, np.arange(len(order) + 1), kinds.T, **CELLS)
+        mark_resonance(bottom, response)
+    label_columns(panels, shown[0])
     panels[1, 0].set_ylabel("nodes by distance from the middle [mm]")
-    ticks = np.unique(np.linspace(0, len(order) - 1, MOST_TICKS).round().astype(int))
-    panels[1, 0].set_yticks(ticks + 0.5, [f"{distance[order[tick]]:.2g}" for tick in ticks])
-    _legend(figure)
+    panels[1, 0].set_yticks(*ticks)
+    legend_of_colours(figure, KINDS)
     return figure
 
 
 def pad_states(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw the state of the nodes on the pad: below, at and above the peak of each force."""
-    shown = [file["responses"][name] for name in spread(contents.responses, MOST_PADS)]
+    shown = shown_responses(file, contents, MOST_PADS)
     height = PAD_ROWS * min(1.0, WIDE / len(shown))
     figure = new_figure(_title(shown), AROUND_PADS + height, compress=True)
     panels = figure.subplots(len(OCTAVES), len(shown), sharex=True, sharey=True, squeeze=False)
@@ -93,7 +90,7 @@ def pad_states(file: h5py.File, contents: VibrationContents) -> Figure:
         row[0].set_ylabel(f"{name}\ny [mm]")
     for axis in panels[-1]:
         axis.set_xlabel("x [mm]")
-    _legend(figure)
+    legend_of_colours(figure, KINDS)
     return figure
 
 
@@ -115,32 +112,6 @@ def _title(shown: list[h5py.Group]) -> str:
         sticking = int((kinds == STICKS).sum())
         texts.append(f"{sticking} of {touching} {under_in(response.attrs)}")
     return f"Nodes that touch and only stick at the peak: {', '.join(texts)}"
-
-
-# --- over frequency -----------------------------------------------------------------------------
-
-
-def _draw_over_frequency(axis: Axes, response: h5py.Group, order: Indices) -> None:
-    frequency = response["frequency"][()]
-    edges = np.geomspace(frequency.min(), frequency.max(), COLUMNS + 1)
-    points = largest_at(frequency, response["amplitude"][:, -1], np.sqrt(edges[1:] * edges[:-1]))
-    nodes = np.arange(len(order) + 1)
-    axis.grid(visible=False)
-    axis.pcolormesh(edges, nodes, kinds_of(response)[points][:, order].T, **CELLS)
-
-
-def largest_at(frequency: Array, amplitude: Array, wanted: Array) -> Indices:
-    """Return points ``(w,)`` of a curve ``(p,)`` nearest to the frequencies ``wanted``.
-
-    Where the curve folds, it has several motions at a frequency: the largest is taken.
-    """
-    before, after = frequency[:-1], frequency[1:]
-    low, high = np.minimum(before, after), np.maximum(before, after)
-    inside = (low <= wanted[:, None]) & (wanted[:, None] <= high)
-    sizes = np.where(inside, np.maximum(amplitude[:-1], amplitude[1:]), -1.0)
-    segment = sizes.argmax(axis=1)
-    second = np.abs(after[segment] - wanted) < np.abs(before[segment] - wanted)
-    return np.asarray(segment + second)
 
 
 def _point_near(response: h5py.Group, frequency: float) -> int:
@@ -170,8 +141,3 @@ def _edges(lines: Array) -> Array:
     """Return edges of the cells around ascending ``lines``, with whole first and last cells."""
     between = 0.5 * (lines[1:] + lines[:-1])
     return np.concatenate([[2.0 * lines[0] - between[0]], between, [2.0 * lines[-1] - between[-1]]])
-
-
-def _legend(figure: Figure) -> None:
-    patches = [Patch(facecolor=colour, label=name) for name, colour in KINDS.items()]
-    figure.legend(handles=patches, loc="outside lower center", ncols=len(KINDS), columnspacing=1.2)

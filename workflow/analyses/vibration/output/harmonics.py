@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,19 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray
 from sa_solver.types import Array
 from workflow.analyses.vibration.output.layout import CONVENTION
-from workflow.analyses.vibration.output.outcome import CURVE, RESONANCE, Response
+from workflow.analyses.vibration.output.outcome import Response
 from workflow.layout.declared import Arrays
 from workflow.models.rig.rig_model import RigModel
-from workflow.shell.output.tables import DIGITS, heading, write_table
+from workflow.shell.output.tables import DIGITS, write_table
 from workflow.shell.terminal.reporter import Reporter
 
 MEGABYTE = 1e6
+# Columns of the table of harmonics.
+HEADINGS = (
+    *("frequency [Hz]", "motion", "harmonic", "of", "name"),
+    *("displacement_real [mm]", "displacement_imaginary [mm]"),
+    *("force_real [N]", "force_imaginary [N]"),
+)
 
 
 def names_of(rig: RigModel) -> Arrays:
@@ -90,36 +96,25 @@ def write_harmonics(path: Path, names: Arrays, response: Response) -> None:
     rows = [
         row
         for group, values in response.harmonics.items()
-        if group != CURVE
+        if group != "curve"
         for row in _rows(group, values, names)
     ]
-    write_table(path, _columns(rows), DIGITS, note=f"{CONVENTION}; against the ground")
+    columns = dict(zip(HEADINGS, zip(*rows, strict=True), strict=True))
+    write_table(path, columns, DIGITS, note=f"{CONVENTION}; against the ground")
 
 
-def _rows(group: str, values: Arrays, names: Arrays) -> Iterator[Mapping[str, Any]]:
-    motion = RESONANCE if group == RESONANCE else str(int(group.rpartition("_")[2]) + 1)
+def _rows(group: str, values: Arrays, names: Arrays) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of one motion; the forces of places stay empty."""
+    motion = "resonance" if group == "resonance" else str(int(group.rpartition("_")[2]) + 1)
     places, joints = (names[kind].ravel().tolist() for kind in ("places", "joints"))
     for k, order in enumerate(values["harmonic"].tolist()):
-        begin = {
-            heading("frequency", "Hz"): float(values["frequency"]),
-            "motion": motion,
-            heading("harmonic", ""): order,
-        }
-        moved, pulled = (values[f"joint_{name}"][k].ravel() for name in ("displacement", "force"))
-        for name, place in zip(places, values["displacement"][k], strict=True):
-            yield begin | _row("place", name, place, None)
-        for name, along, force in zip(joints, moved, pulled, strict=True):
-            yield begin | _row("joint", name, along, force)
+        begin = float(values["frequency"]), motion, order
+        for name, moved in zip(places, values["displacement"][k], strict=True):
+            yield *begin, "place", name.decode(), *_parts(moved), "", ""
+        both = (values[f"joint_{name}"][k].ravel() for name in ("displacement", "force"))
+        for name, moved, pulled in zip(joints, *both, strict=True):
+            yield *begin, "joint", name.decode(), *_parts(moved), *_parts(pulled)
 
 
-def _row(kind: str, name: bytes, moved: complex, pulled: complex | None) -> dict[str, Any]:
-    row: dict[str, Any] = {"of": kind, "name": name.decode()}
-    for what, unit, value in (("displacement", "mm", moved), ("force", "N", pulled)):
-        parts = ("", "") if value is None else (float(value.real), float(value.imag))
-        for part, number in zip(("real", "imaginary"), parts, strict=True):
-            row[heading(f"{what}_{part}", unit)] = number
-    return row
-
-
-def _columns(rows: list[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    return {name: [row[name] for row in rows] for name in rows[0]}
+def _parts(number: complex) -> tuple[float, float]:
+    return float(number.real), float(number.imag)

@@ -2,21 +2,6 @@
 
 from __future__ import annotations
 
-from workflow.analyses.vibration.output.outcome import (
-    AT,
-    BACKBONE,
-    BIFURCATIONS,
-    CURVE,
-    DIAMETERS,
-    FORCE_SWEEPS,
-    FURTHER,
-    HARMONICS,
-    LOOPS,
-    MODES,
-    NODES,
-    RESONANCE,
-    RESPONSES,
-)
 from workflow.layout.declared import Declarations, Layout, declared
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.models.vibration.layout import AMPLITUDES, MOTIONS, linear_limits
@@ -49,7 +34,7 @@ _HARMONICS = f"""
 
 def layout_of(amount: ExcitationSize) -> Layout:
     """Return the layout of a case whose excitation has an amount: a force or a level."""
-    response, name = f"{RESPONSES}/<response>", amount.name
+    response, name = "responses/<response>", amount.name
     along_force = f"""
     amplitude | mm | {name} | {_LOOKED_AT}
     {_STABILITY.format(dim=name)}{MOTIONS.format(dim=name)}"""
@@ -58,7 +43,7 @@ linear{linear_limits(amount)}
 names
     places | 1 | place | whose displacements have harmonics
     joints | 1 | joint direction | stretch of every direction of every joint
-{DIAMETERS}
+nodal_diameters
     diameters | 1 | diameters | nodal diameters of a wave
     free | Hz | diameters mode | lowest natural frequencies, without the joints
     stuck | Hz | diameters mode | lowest natural frequencies, all joints stuck
@@ -68,41 +53,41 @@ contact
     area | mm^2 | joint | area that belongs to each joint
     normal_force | N | joint | of each joint at rest
     normal_displacement | mm | joint | closing of each joint by the load at rest
-{response}, {FURTHER}/<branch>{_BRANCH}
-{response}/{NODES}
+{response}, further_branches/<branch>{_BRANCH}
+{response}/nodes
     slip | 1 | point joint | share of the cycle in which each joint slips, by point of the curve
     separated | 1 | point joint | share of the cycle in which each joint is open
     energy | N mm | point joint | energy that each joint dissipates in a cycle
-{response}/{RESONANCE}
+{response}/resonance
     displacement | mm | sample joint direction | of each joint along x, y, and its closing, in time
     force | N | sample joint direction | of each joint along x, y and its pressure
     state | 1 | sample joint | state of each joint: 0 sticks, 1 slips, 2 is open
-{response}/{LOOPS}/<loop>
+{response}/loops/<loop>
     displacement | mm | point_of_loop | between the targets, or the mean of the joints, in a cycle
     force | N | point_of_loop | force of all joints together along it
     expansion | N | point_of_loop | the same force in the harmonics of the motion alone
-{response}/{AT}
+{response}/at
     frequency | Hz | motion | frequency of the force; motions in the order of the curve
     {AMPLITUDES.format(dim="motion")}{MOTIONS.format(dim="motion")}
     error | 1 | motion | estimated error of vibration or energy lost, due to harmonics and
         samples
-{response}/{HARMONICS}/{CURVE}
+{response}/harmonics/curve
     frequency | Hz | point | f, in the order of the curve
     {_HARMONICS.format(along="point", order="by point of the curve and harmonic")}
-{response}/{HARMONICS}/<motion>
+{response}/harmonics/<motion>
     frequency | Hz | | f, of the motion
     {_HARMONICS.format(along="", order="by harmonic")}
-{BACKBONE}
+backbone
     {name} | {amount.unit} | {name} | {amount.description}
     frequency | Hz | {name} | phase resonance: the driven point lags the force by 90
         degrees
     {along_force}
-{FORCE_SWEEPS}/<sweep>
+force_sweeps/<sweep>
     {name} | {amount.unit} | {name} | {amount.description}, in the order of the curve
     {along_force}
-{response}/{BIFURCATIONS}, {FURTHER}/<branch>/{BIFURCATIONS}{_bifurcations(amount)}
-{BACKBONE}/{BIFURCATIONS}, {FORCE_SWEEPS}/<sweep>/{BIFURCATIONS}{_bifurcations(amount)}
-{MODES}/<mode>
+{response}/bifurcations, further_branches/<branch>/bifurcations{_bifurcations(amount)}
+backbone/bifurcations, force_sweeps/<sweep>/bifurcations{_bifurcations(amount)}
+modes/<mode>
     amplitude | mm | modal_amplitude | {_LOOKED_AT}, in the order of the curve
     modal_amplitude | t^0.5 mm | modal_amplitude | norm of harmonic 1 by the mass
     frequency | Hz | modal_amplitude | of the mode

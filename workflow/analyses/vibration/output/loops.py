@@ -13,18 +13,16 @@ from fe_models.dynamics.periodic.harmonic_balance import SAMPLES_PER_PERIOD, Har
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.periodic.resolution_error import resolution_error
-from sa_solver.steps import Steps
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.measured.loop_record import MeasuredLoopError
 from wear.joints.measured.measured_loops import measure_loops
 from wear.joints.periodic.march import SLIP, STICK
-from workflow.analyses.vibration.case.vibration_case import VibrationCase
+from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.outcome import Curves
 from workflow.models.rig.laws import grouped
 from workflow.models.vibration.structure import VibratingStructure
-from workflow.shell.terminal.reporter import Reporter
 
 # A loop counts as stuck where its energy is below this share of stroke times force range.
 STUCK_LOOP = 1e-4
@@ -32,14 +30,9 @@ STUCK_LOOP = 1e-4
 REPEATED = 3
 
 
-def loops_of(
-    case: VibrationCase,
-    model: VibratingStructure,
-    branch: ResponseBranch,
-    reporter: Reporter,
-    steps: Steps,
-) -> tuple[Curves, ...]:
+def loops_of(run: VibrationRun, branch: ResponseBranch) -> tuple[Curves, ...]:
     """Return loops at the frequency that the case asks for, one per resolution."""
+    case, reporter = run.case, run.reporter
     if case.loops is None:
         return ()
     frequency = case.loops.frequency
@@ -51,13 +44,13 @@ def loops_of(
         reporter.doing(f"{reported}: loop at {frequency:g} Hz, {harmonics} harmonics")
         samples = max(case.resolution.samples, SAMPLES_PER_PERIOD * every[-1])
         problem = branch.problem.with_resolution(Resolution(every, samples))
-        motion = steps("loop", partial(_known, problem, frequency, start))
+        motion = run.steps("loop", partial(_known, problem, frequency, start))
         if not motion.converged:
             reporter.warn(f"{reported}: no loop at {frequency:g} Hz: {motion.message}")
             continue
         number = None if case.loops.joints is None else case.loops.joints - 1
         load = case.laws[number or 0].normal_load
-        loops.append(loop_of(model, motion, load, number))
+        loops.append(loop_of(run.structure, motion, load, number))
         start = motion
     return tuple(loops)
 

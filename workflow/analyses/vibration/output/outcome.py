@@ -12,27 +12,7 @@ import numpy as np
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.layout.declared import Arrays
 
-# Groups of a response, in addition to its own curves.
-NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
-# Motions at the frequencies of the case, and harmonics of motions.
-AT, HARMONICS = "at", "harmonics"
-# Harmonics at the points of a curve, and of motions at the frequencies of the case.
-CURVE, ANSWER = "curve", "at_{:05d}"
-# Natural frequencies by nodal diameters.
-DIAMETERS = "nodal_diameters"
-# Properties of the ring, in the summary.
-RING = "ring"
-# Branches that are not reached from an end of the frequencies.
-FURTHER = "further_branches"
-# Points of a curve at which the stability changes.
-BIFURCATIONS = "bifurcations"
 Bifurcations = tuple[Mapping[str, Any], ...]
-# Motions along the force at a frequency.
-FORCE_SWEEPS = "force_sweeps"
-# Motions under each force, and the curve of phase resonance through all of them.
-RESPONSES, BACKBONE = "responses", "backbone"
-# Modes over their amplitude.
-MODES = "modes"
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import partial
 from typing import Any
 
 from workflow.analyses.vibration.case.excitation import amount_in, under_in
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.output.outcome import AT, MODES
 from workflow.models.vibration.amount import LEVEL
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
@@ -46,7 +44,6 @@ ANSWER = {
     "phase": ("rad", "phase by which the motion leads the force", "deg"),
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
 }
-LOOP_WITH_ERROR = "energy", "stroke"
 # Quantities of a mode over its amplitude.
 MODE = {
     "linear_frequency": ("Hz", "frequency of the linear mode", ""),
@@ -81,14 +78,22 @@ def main_results(case: VibrationCase, summary: Summary) -> list[SummaryQuantity]
         for number, response in enumerate(summary["responses"])
         for quantity in (
             *of_response(under_in(response), f"responses.{number}", response, summary),
-            *_of_loop(under_in(response), f"responses.{number}.loops.-1", summary),
+            *_of(
+                under_in(response),
+                f"responses.{number}.loops.-1",
+                LOOP,
+                ("energy", "stroke"),
+                summary,
+            ),
             *_of_answers(under_in(response), f"responses.{number}", response, summary),
         )
     )
     modes = (
         quantity
-        for number, mode in enumerate(summary.get(MODES, ()))
-        for quantity in _of_mode(f"mode {mode['mode']}", f"{MODES}.{number}", summary)
+        for number, mode in enumerate(summary.get("modes", ()))
+        for quantity in _of(
+            f"mode {mode['mode']}", f"modes.{number}", MODE, ("most_damped",), summary
+        )
     )
     return reported(summary, [*limits, *records, *responses, *modes])
 
@@ -100,27 +105,17 @@ def of_response(
     numbers = NUMBERS | {name: reported for name, reported in BESIDE.items() if name in response}
     if amount_in(response)[0] is LEVEL:
         numbers |= {"receptance": ("mm", "amplitude over level at resonance", "")}
-    return _of(group, path, numbers, WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
-
-
-def _of_loop(group: str, path: str, summary: Summary) -> Iterator[SummaryQuantity]:
-    return _of(group, path, LOOP, LOOP_WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
-
-
-def _of_mode(group: str, path: str, summary: Summary) -> Iterator[SummaryQuantity]:
-    error = estimate(summary, f"{path}.error", ERROR)
-    return _of(group, path, MODE, ("most_damped",), error)
+    return _of(group, path, numbers, WITH_ERROR, summary)
 
 
 def _of_answers(
     group: str, path: str, response: Mapping[str, Any], summary: Summary
 ) -> Iterator[SummaryQuantity]:
     """Yield results of motions at the frequencies of the case, of each one that coexists."""
-    for place, answer in enumerate(response.get(AT, ())):
+    for place, answer in enumerate(response.get("at", ())):
         count = len(answer["motions"])
         for number in range(count):
-            of = f"{path}.{AT}.{place}.motions.{number}"
-            error = estimate(summary, f"{of}.error", ERROR)
+            of = f"{path}.at.{place}.motions.{number}"
             which = f", motion {number + 1} of {count}" if count > 1 else ""
             suffix = f" at {answer['frequency']:g} Hz{which}"
             reported = {
@@ -128,7 +123,7 @@ def _of_answers(
                 for name, (unit, text, everyday) in ANSWER.items()
                 if name in answer["motions"][number]
             }
-            yield from _of(group, of, reported, WITH_ERROR, error)
+            yield from _of(group, of, reported, WITH_ERROR, summary)
 
 
 def _of(
@@ -136,9 +131,10 @@ def _of(
     path: str,
     numbers: Mapping[str, tuple[str, str, str]],
     with_error: tuple[str, ...],
-    error: Mapping[str, Any],
+    summary: Summary,
 ) -> Iterator[SummaryQuantity]:
-    of = partial(SummaryQuantity, group)
+    """Yield results at a ``path`` of the summary; the error there applies to some of them."""
+    error = estimate(summary, f"{path}.error", ERROR)
     for name, (unit, text, everyday) in numbers.items():
         known = error if name in with_error else {}
-        yield of(text, f"{path}.{name}", unit, everyday=everyday, **known)
+        yield SummaryQuantity(group, text, f"{path}.{name}", unit, everyday=everyday, **known)

@@ -4,25 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import degrees, pi
+from pathlib import Path
 from typing import Any
 
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.output.harmonics import write_harmonics
 from workflow.analyses.vibration.output.layout import bifurcation_columns, layout_of
 from workflow.analyses.vibration.output.outcome import (
-    AT,
-    BACKBONE,
-    BIFURCATIONS,
-    DIAMETERS,
-    FORCE_SWEEPS,
-    FURTHER,
-    HARMONICS,
-    LOOPS,
-    MODES,
-    NODES,
-    RESONANCE,
-    RESPONSES,
-    RING,
     Answers,
     Bifurcations,
     Curves,
@@ -32,15 +20,14 @@ from workflow.analyses.vibration.output.outcome import (
 from workflow.analyses.vibration.stability import bifurcation_arrays
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
-from workflow.layout.declared import Arrays
 from workflow.models.vibration.amount import ExcitationSize
+from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import ResultsWriter, run_results
 from workflow.shell.output.summary import finish
 from workflow.shell.output.tables import DIGITS, heading, write_curves, write_table
 
-TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
 TO_RPM = 30.0 / pi  # rad/s to rpm
 
 
@@ -70,19 +57,20 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
         writer.put("linear", outcome.linear, **limits)
         writer.put("names", outcome.names)
         if outcome.diameters is not None:
-            writer.put(DIAMETERS, outcome.diameters, **outcome.numbers[RING])
-            path = folder.reserve(f"{DIAMETERS}.csv", "natural frequencies, over nodal diameters")
-            write_curves(path, outcome.diameters, layout.datasets(DIAMETERS))
+            what = "natural frequencies, over nodal diameters"
+            path = folder.reserve("nodal_diameters.csv", what)
+            ring = outcome.numbers["ring"]
+            writer.put_table(path, "nodal_diameters", outcome.diameters, **ring)
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
             _put_response(writer, number, outcome, response, folder)
         for place, name, what, curve in _curves(outcome):
-            writer.put(place, curve.arrays, **curve.numbers)
+            path = folder.reserve(f"{name}.csv", what)
+            writer.put_table(path, place, curve.arrays, **curve.numbers)
             _put_bifurcations(writer, place, curve.bifurcations, case.amount)
-            write_curves(folder.reserve(f"{name}.csv", what), curve.arrays, layout.datasets(place))
     if found := list(_every_bifurcation(outcome)):
-        path = folder.reserve(f"{BIFURCATIONS}.csv", "where the stability of motions changes")
+        path = folder.reserve("bifurcations.csv", "where the stability of motions changes")
         columns: dict[str, list[Any]] = {
             "curve": [curve for curve, _ in found],
             "kind": [each["kind"] for _, each in found],
@@ -97,16 +85,16 @@ def _curves(outcome: VibrationOutcome) -> Iterator[tuple[str, str, str, Curves]]
     amount = outcome.case.amount
     over = f"over the {amount.name}"
     if outcome.backbone is not None:
-        yield BACKBONE, BACKBONE, f"phase resonance, {over}", outcome.backbone
+        yield "backbone", "backbone", f"phase resonance, {over}", outcome.backbone
     for number, branch in enumerate(outcome.further):
         what = f"further branch {amount.under(branch.numbers[amount.name])}, over frequency"
-        yield f"{FURTHER}/{number:05d}", f"further_branch_{number:05d}", what, branch
+        yield f"further_branches/{number:05d}", f"further_branch_{number:05d}", what, branch
     for number, sweep in enumerate(outcome.force_sweeps):
         what = f"response at {sweep.numbers['frequency']:g} Hz, {over}"
-        yield f"{FORCE_SWEEPS}/{number:05d}", f"force_sweep_{number:05d}", what, sweep
+        yield f"force_sweeps/{number:05d}", f"force_sweep_{number:05d}", what, sweep
     for number, mode in enumerate(outcome.modes):
         what = f"mode {mode.numbers['mode']}, over its amplitude"
-        yield f"{MODES}/{number:05d}", f"mode_{mode.numbers['mode']:05d}", what, mode
+        yield f"modes/{number:05d}", f"mode_{mode.numbers['mode']:05d}", what, mode
 
 
 def _put_response(
@@ -117,36 +105,35 @@ def _put_response(
     folder: OutputFolder,
 ) -> None:
     """Write a response, its harmonics, loops and motions at given frequencies, and their tables."""
-    amount, place = outcome.case.amount, f"{RESPONSES}/{number:05d}"
+    amount, place = outcome.case.amount, f"responses/{number:05d}"
     under, layout = amount.under(response.force), layout_of(amount)
 
-    def write_csv(name: str, what: str, curves: Arrays, *groups: str) -> None:
-        path = folder.reserve(f"{name}_{number:05d}.csv", what)
-        declared = {k: v for group in groups for k, v in layout.datasets(group).items()}
-        write_curves(path, curves, declared)
+    def table(name: str, what: str) -> Path:
+        return folder.reserve(f"{name}_{number:05d}.csv", what)
 
-    put_response_curves(writer, place, amount, response)
-    write_csv("frf", f"response {under}, over frequency", response.curves, place)
-    nodes = f"{place}/{NODES}"
+    path = table("frf", f"response {under}, over frequency")
+    put_response_curves(writer, path, place, amount, response)
+    nodes = f"{place}/nodes"
     writer.put(nodes, response.nodes)
-    frequency = {"frequency": response.curves["frequency"]}
-    what = f"what each joint does {under}"
-    write_csv("joints", what, {**frequency, **response.nodes}, place, nodes)
+    write_curves(
+        table("joints", f"what each joint does {under}"),
+        {"frequency": response.curves["frequency"], **response.nodes},
+        {**layout.datasets(place), **layout.datasets(nodes)},
+    )
     if response.resonance is not None:
-        writer.put(f"{place}/{RESONANCE}", response.resonance)
+        writer.put(f"{place}/resonance", response.resonance)
     for count, loop in enumerate(response.loops):
-        writer.put(f"{place}/{LOOPS}/{count:05d}", loop.arrays, **loop.numbers)
+        writer.put(f"{place}/loops/{count:05d}", loop.arrays, **loop.numbers)
     for loop in response.loops[-1:]:
-        write_csv("loop", f"loop of the joints {under}", loop.arrays, f"{place}/{LOOPS}/-")
+        path = table("loop", f"loop of the joints {under}")
+        write_curves(path, loop.arrays, layout.datasets(f"{place}/loops/-"))
     if response.answers is not None:
-        answers = response.answers.arrays
-        writer.put(f"{place}/{AT}", answers)
-        write_csv("at", f"motions {under}, as requested", answers, f"{place}/{AT}")
+        path = table("at", f"motions {under}, as requested")
+        writer.put_table(path, f"{place}/at", response.answers.arrays)
     for of, arrays in response.harmonics.items():
-        writer.put(f"{place}/{HARMONICS}/{of}", arrays)
+        writer.put(f"{place}/harmonics/{of}", arrays)
     what = f"harmonics of places and joints {under}, at resonance and as requested"
-    path = folder.reserve(f"harmonics_{number:05d}.csv", what)
-    write_harmonics(path, outcome.names, response)
+    write_harmonics(table("harmonics", what), outcome.names, response)
     _put_bifurcations(writer, place, response.bifurcations, amount)
 
 
@@ -157,30 +144,30 @@ def _put_bifurcations(
     if bifurcations:
         kinds = [str(found["kind"]) for found in bifurcations]
         arrays = bifurcation_arrays(bifurcations, amount)
-        writer.put(f"{place}/{BIFURCATIONS}", arrays, kind=kinds)
+        writer.put(f"{place}/bifurcations", arrays, kind=kinds)
 
 
 def put_response_curves(
-    writer: ResultsWriter, place: str, amount: ExcitationSize, response: Response
+    writer: ResultsWriter, path: Path, place: str, amount: ExcitationSize, response: Response
 ) -> None:
-    """Write the curves of a response and its numbers."""
+    """Write the curves of a response, to the results and as a table, and its numbers."""
     numbers = {amount.name: response.force, **response.numbers}
-    writer.put(place, response.curves, **numbers)
+    writer.put_table(path, place, response.curves, **numbers)
 
 
 def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield all bifurcations, each with the name of the curve that it is on."""
-    for response in outcome.responses:
-        yield from (
-            (outcome.case.amount.as_text(response.force), found) for found in response.bifurcations
-        )
-    for number, branch in enumerate(outcome.further):
-        yield from ((f"further branch {number}", found) for found in branch.bifurcations)
-    if outcome.backbone is not None:
-        yield from ((BACKBONE, found) for found in outcome.backbone.bifurcations)
-    for sweep in outcome.force_sweeps:
-        at = f"{sweep.numbers['frequency']:g} Hz"
-        yield from ((at, found) for found in sweep.bifurcations)
+    named: list[tuple[str, Response | Curves]] = [
+        *(
+            (outcome.case.amount.as_text(response.force), response)
+            for response in outcome.responses
+        ),
+        *((f"further branch {number}", curve) for number, curve in enumerate(outcome.further)),
+        *([] if outcome.backbone is None else [("backbone", outcome.backbone)]),
+        *((f"{sweep.numbers['frequency']:g} Hz", sweep) for sweep in outcome.force_sweeps),
+    ]
+    for name, curve in named:
+        yield from ((name, found) for found in curve.bifurcations)
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -196,31 +183,29 @@ def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
     }
     if outcome.backbone is not None:
         points = len(outcome.backbone.arrays["frequency"])
-        summary[BACKBONE] = {"points": points, **_curve_summary(outcome.backbone)}
+        summary["backbone"] = {"points": points, **_curve_summary(outcome.backbone)}
     if outcome.force_sweeps:
-        summary[FORCE_SWEEPS] = [_curve_summary(sweep) for sweep in outcome.force_sweeps]
+        summary["force_sweeps"] = [_curve_summary(sweep) for sweep in outcome.force_sweeps]
     if outcome.further:
-        summary[FURTHER] = [_curve_summary(branch) for branch in outcome.further]
+        summary["further_branches"] = [_curve_summary(branch) for branch in outcome.further]
     if outcome.modes:
-        summary[MODES] = [dict(mode.numbers) for mode in outcome.modes]
+        summary["modes"] = [dict(mode.numbers) for mode in outcome.modes]
     return summary
 
 
-def _curve_summary(curve: Curves) -> dict[str, Any]:
+def _curve_summary(curve: Curves | Response) -> dict[str, Any]:
     summary = dict(curve.numbers)
     if curve.bifurcations:
-        summary[BIFURCATIONS] = [dict(found) for found in curve.bifurcations]
+        summary["bifurcations"] = [dict(found) for found in curve.bifurcations]
     return summary
 
 
 def _response_summary(amount: ExcitationSize, response: Response) -> dict[str, Any]:
-    summary = {amount.name: response.force, **response.numbers}
-    if response.bifurcations:
-        summary[BIFURCATIONS] = [dict(found) for found in response.bifurcations]
+    summary = {amount.name: response.force, **_curve_summary(response)}
     if response.loops:
-        summary[LOOPS] = [dict(loop.numbers) for loop in response.loops]
+        summary["loops"] = [dict(loop.numbers) for loop in response.loops]
     if response.answers is not None:
-        summary[AT] = [dict(numbers) for numbers in response.answers.numbers]
+        summary["at"] = [dict(numbers) for numbers in response.answers.numbers]
     return summary
 
 

@@ -14,22 +14,11 @@ from matplotlib.figure import Figure
 from sa_solver.types import Array, Indices
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.figures.stability import draw_motions, explain_stability
-from workflow.analyses.vibration.output.outcome import RESPONSES
-from workflow.analyses.vibration_wear.output.outcome import (
-    CONTACT,
-    EVOLUTION,
-    HALF_SPACE,
-    LOOP,
-    NODES,
-    PLACES,
-    WORN,
-    VibrationWearContents,
-)
+from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents
 from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
 from workflow.pictures.panels import (
     Figures,
     legend_below,
-    legend_on_the_right,
     new_figure,
     plain_ticks,
     shaded,
@@ -95,15 +84,15 @@ def frequency_response(file: h5py.File) -> Figure:
     shown = spread(range(len(forces)), MOST_FORCES)
     figure = new_figure(_change(file, *STUCK), 4.0 * len(shown) + 0.5)
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    states = shaded(sorted(file[WORN]), len(file[WORN]))
+    states = shaded(sorted(file["worn"]), len(file["worn"]))
     named = set(spread([name for name, _ in states], MOST_STATES))
     for axis, place in zip(panels, shown, strict=True):
-        responses = [file[f"{WORN}/{name}/{RESPONSES}/{place:05d}"] for name, _ in states]
+        responses = [file[f"worn/{name}/responses/{place:05d}"] for name, _ in states]
         for response, (name, colour) in zip(responses, states, strict=True):
             frequency, amplitude = response["frequency"][()], response["amplitude"][:, -1]
             look = {"color": colour}
             if name in named:
-                cycles = _cycles(file[WORN][name])
+                cycles = _cycles(file["worn"][name])
                 look["label"] = f"{cycles}: {response.attrs['resonance']:.4g} Hz"
             receptance = TO_MICRONS * amplitude / forces[place]
             draw_motions(axis, response, frequency, receptance, **look)
@@ -112,7 +101,7 @@ def frequency_response(file: h5py.File) -> Figure:
         explain_stability(axis, responses)
         over = f"amplitude / {amount.name} [{amount.receptance[1]}]"
         axis.set(title=amount.as_text(forces[place]), ylabel=over, yscale="log")
-        legend_on_the_right(axis, "cycles: resonance")
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles: resonance")
     panels[-1].set(xlabel="frequency [Hz]", xscale="log")
     for side in (panels[-1].xaxis, *(axis.yaxis for axis in panels)):
         plain_ticks(side)
@@ -133,7 +122,7 @@ def _amount(file: h5py.File) -> ExcitationSize:
 
 def evolution(file: h5py.File, contents: VibrationWearContents) -> Figure:
     """Draw stiffness, resonances, motion and scar against cycles, from the unworn contact on."""
-    history, forces = file[EVOLUTION], list(file.attrs["forces"])
+    history, forces = file["evolution"], list(file.attrs["forces"])
     cycles = history["cycles"][()]
     place = np.append(BEFORE * cycles[1], cycles[1:])
     figure = new_figure(_change(file, *STIFFNESS), 9.0)
@@ -161,7 +150,7 @@ def scar(file: h5py.File) -> Figure:
     figure = new_figure(_change(file, *DEEPEST), 9.0)
     depth, pressure, energy = figure.subplots(3, 1, sharex=True)
     for state, colour in _states(file):
-        contact, label = state[CONTACT], _cycles(state)
+        contact, label = state["contact"], _cycles(state)
         worn = TO_MICRONS * (contact["depth_1"][:, middle] + contact["depth_2"][:, middle])
         depth.plot(along, worn, color=colour, label=label)
         pressure.plot(along, contact["pressure"][:, middle], color=colour)
@@ -176,14 +165,14 @@ def scar(file: h5py.File) -> Figure:
 
 def profile(file: h5py.File) -> Figure:
     """Draw gap, pressure at rest and energy of a cycle along the pad's middle and diagonal."""
-    places = {name: file[PLACES][name][()] for name in ("x", "y", "area")}
+    places = {name: file["places"][name][()] for name in ("x", "y", "area")}
     sections = _sections(places["x"], places["y"])
     figure = new_figure(_change(file, *DEEPEST), 9.0)
     panels = figure.subplots(3, len(sections), sharex="col", sharey="row", squeeze=False)
     for (along, nodes, label), column in zip(sections, panels.T, strict=True):
         for state, colour in _states(file):
             area = places["area"][nodes]
-            gap, force, energy = (state[NODES][n][()][nodes] for n in PROFILE)
+            gap, force, energy = (state["nodes"][n][()][nodes] for n in PROFILE)
             curves = TO_MICRONS * gap, force / area, energy / area
             for axis, values in zip(column, curves, strict=True):
                 axis.plot(along, values, ".-", color=colour, label=_cycles(state))
@@ -216,9 +205,9 @@ def loops(file: h5py.File, contents: VibrationWearContents) -> Figure:
     axis = figure.subplots()
     for state, colour in _states(file):
         label = f"{_cycles(state)}: {state.attrs['energy_per_cycle']:.4g} mJ"
-        axis.plot(*_loop(state[LOOP]), color=colour, label=label)
+        axis.plot(*_loop(state["loop"]), color=colour, label=label)
         if not contents.at_nodes:
-            axis.plot(*_loop(state[HALF_SPACE]), "o", color=colour, markersize=3)
+            axis.plot(*_loop(state["half_space_loop"]), "o", color=colour, markersize=3)
     if contents.at_nodes:
         axis.set(
             xlabel="displacement between the targets, or mean of the contacts [µm]",
@@ -248,7 +237,9 @@ def _draw_pair(axis: Axes, place: Array, history: h5py.Group, curves: Sequence[C
 
 def _states(file: h5py.File) -> list[tuple[h5py.Group, Any]]:
     """Return the states to show, each with its colour."""
-    return [(file[WORN][name], colour) for name, colour in shaded(sorted(file[WORN]), MOST_STATES)]
+    return [
+        (file["worn"][name], colour) for name, colour in shaded(sorted(file["worn"]), MOST_STATES)
+    ]
 
 
 def _cycles(state: h5py.Group) -> str:
@@ -258,7 +249,7 @@ def _cycles(state: h5py.Group) -> str:
 
 def _change(file: h5py.File, name: str, scale: float, unit: str, what: str) -> str:
     """Return a title on the change of a number from the first state to the last."""
-    history = file[EVOLUTION]
+    history = file["evolution"]
     cycles = history["cycles"][()]
     values = scale * history[name][()].reshape(len(cycles), -1)[:, 0]
     after = f"{cycles[-1]:,.0f} cycles, {TO_JOULES * history['energy'][-1]:.4g} J"

@@ -5,27 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from workflow.analyses.vibration.output import layout as vibration
-from workflow.analyses.vibration.output.outcome import RESPONSES
-from workflow.analyses.vibration_wear.output.outcome import (
-    CONTACT,
-    EVOLUTION,
-    HALF_SPACE,
-    LOOP,
-    NODES,
-    PLACES,
-    POSITION,
-    SLIDERS,
-    WORN,
-)
 from workflow.layout.declared import GRID, Layout
 from workflow.models.vibration.amount import ExcitationSize
 
 
 def layout_of(amount: ExcitationSize) -> Layout:
     """Return the layout of a case whose excitation has an amount: a force or a level."""
-    response = f"{RESPONSES}/<response>"
+    response = "responses/<response>"
     curves = vibration.layout_of(amount).datasets(response)
-    return replace(_LAYOUT, groups={**_LAYOUT.groups, f"{WORN}/<state>/{response}": curves})
+    return replace(_LAYOUT, groups={**_LAYOUT.groups, f"worn/<state>/{response}": curves})
 
 
 # Wear and slip at cells or nodes.
@@ -36,13 +24,13 @@ _WORN = """
 _LAYOUT = Layout.read(
     f"""
 grid{GRID}
-{PLACES}
+places
     area | mm^2 | node | area that belongs to each node
     normal | 1 | node axis | out of body 1, what the joints' points meet
-    {POSITION} | mm | node axis | of each node, x, y, z
+    position | mm | node axis | of each node, x, y, z
     x, y | mm | node | of each node on the contact plane, from the middle of all
     name | 1 | node | of the point of each contact
-{EVOLUTION}
+evolution
     cycles | 1 | cycles | under the force that wears
     energy | N mm | cycles | dissipated so far
     volume | mm^3 | cycles | worn from both bodies
@@ -62,25 +50,25 @@ grid{GRID}
     stuck | Hz | cycles mode | natural frequencies with the contact stuck
     resonance | Hz | cycles excitation | under each force
     receptance | mm/N | cycles excitation | largest amplitude of the last mass over each force
-{WORN}/<state>/{CONTACT}
+worn/<state>/contact
     pressure | MPa | x y | at rest
     gap | mm | x y | at rest
     onset | mm | x y | motion of the joint from rest up to which each cell sticks
     {_WORN.format(dims="x y")}
     energy | N/mm | x y | per area, in such a cycle
-{WORN}/<state>/{SLIDERS}
+worn/<state>/sliders
     reach | mm | slider | motion at which each slider gives way
     stiffness | N/mm | slider | of its spring
     normal_load | N | slider | that presses it
     energy | N mm | slider | that it dissipates in a cycle under the force that wears
-{WORN}/<state>/{LOOP}
+worn/<state>/loop
     displacement | mm | point | of the joint or the mean of all, or between the targets, under the
         force that wears
     force | N | point | of the joint along it
-{WORN}/<state>/{HALF_SPACE}
+worn/<state>/half_space_loop
     displacement | mm | point | of the bodies, as far to and fro
     force | N | point | between them, of the whole tangential problem
-{WORN}/<state>/{NODES}
+worn/<state>/nodes
     gap | mm | node | of the worn bodies without load; below 0 what it closes
     normal_force | N | node | of each node at rest
     {_WORN.format(dims="node")}

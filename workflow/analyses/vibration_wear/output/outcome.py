@@ -13,14 +13,6 @@ from workflow.analyses.vibration.output.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
 from workflow.layout.declared import Arrays
 
-# Groups of a state.
-CONTACT, SLIDERS = "contact", "sliders"
-LOOP, HALF_SPACE = "loop", "half_space_loop"
-# Groups for contacts at nodes: fields of a state, and data that do not wear.
-NODES, PLACES = "nodes", "places"
-WORN, EVOLUTION = "worn", "evolution"
-# Coordinates of nodes in space, where they are known.
-POSITION = "position"
 # Error of wear steps before the first one.
 NOTHING_WORN = {"depth": 0.0}
 

@@ -18,14 +18,7 @@ import numpy as np
 from sa_solver.types import Array, Frame
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.output.paraview import pad_mesh
-from workflow.analyses.vibration_wear.output.outcome import (
-    CONTACT,
-    NODES,
-    PLACES,
-    POSITION,
-    WORN,
-    VibrationWearContents,
-)
+from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents
 from workflow.pictures.view import FIRST, PictureScene, Shown, View, write_view
 from workflow.pictures.vtk import (
     CYCLES,
@@ -65,32 +58,32 @@ def write_vibration_wear(
 
 def _cells(file: h5py.File, folder: Path) -> Iterator[Step]:
     points = FacePoints(grid_of(file["grid"]), FACE)
-    for name, state in file[WORN].items():
-        contact = state[CONTACT]
+    for name, state in file["worn"].items():
+        contact = state["contact"]
         shown = {key: points.of(contact[key]) for key in ("pressure", "energy")}
         path = folder / "contact" / f"{name}.vtp"
         mesh = points.mesh(_fields(contact, shown, points.of, "gap", FACE.axes[2]))
-        yield float(state.attrs["cycles"]), CONTACT, path, mesh
+        yield float(state.attrs["cycles"]), "contact", path, mesh
 
 
 def _nodes(file: h5py.File, folder: Path) -> Iterator[Step]:
-    places = file[PLACES]
-    area, placed = places["area"][()], POSITION in places
+    places = file["places"]
+    area, placed = places["area"][()], "position" in places
     normal = places["normal"][()] if placed else FACE.axes[2]
-    for name, state in file[WORN].items():
-        nodes = state[NODES]
+    for name, state in file["worn"].items():
+        nodes = state["nodes"]
         shown = {"pressure": nodes["normal_force"][()] / area, "energy": nodes["energy"][()] / area}
         mesh = _body_mesh(places) if placed else pad_mesh(places)
         fields = _fields(nodes, shown, lambda dataset: dataset[()], "unloaded_gap", normal)
         attach(mesh.point_data, fields | {"area": (area, "mm^2")})
-        yield float(state.attrs["cycles"]), CONTACT, folder / "contact" / f"{name}.vtu", mesh
+        yield float(state.attrs["cycles"]), "contact", folder / "contact" / f"{name}.vtu", mesh
 
 
 def _body_mesh(places: h5py.Group) -> pyvista.UnstructuredGrid:
     """Return quadrilaterals between nodes in rows and columns, for each normal; or nodes alone."""
     import pyvista
 
-    position, normals = places[POSITION][()], places["normal"][()]
+    position, normals = places["position"][()], places["normal"][()]
     faces, alone = [], []
     for normal in np.unique(normals, axis=0):
         nodes = np.flatnonzero((normals == normal).all(axis=1))
@@ -128,8 +121,8 @@ def _fields(
 
 def _write_view(file: h5py.File, folder: Path) -> Path:
     """Write the script, which begins at the last state, and return its path."""
-    states = list(file[WORN].values())
-    last = states[-1][NODES if NODES in states[-1] else CONTACT]
+    states = list(file["worn"].values())
+    last = states[-1]["nodes" if "nodes" in states[-1] else "contact"]
     most = 1 if np.max(last["depth_1"][()]) >= np.max(last["depth_2"][()]) else 2
     views = [
         View("Worn depth of both bodies", [Shown(SERIES, "depth [mm]", f"worn_{most} [mm]")]),

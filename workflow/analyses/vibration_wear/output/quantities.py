@@ -3,33 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from itertools import chain
 from typing import Any
 
 from workflow.analyses.vibration.case.excitation import under_in
 from workflow.analyses.vibration.output.quantities import of_response
 from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
+from workflow.analyses.vibration_wear.output.layout import layout_of
 from workflow.case.text.plain import times
+from workflow.case.text.readable import everyday_unit
+from workflow.layout.declared import Declarations
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.output.summary import number_at, reported
 
 WORN = "depth or volume, by the wear steps, and by harmonics and samples of the motion that wears"
 MOTION = "joints' vibration or energy lost, by harmonics and samples"
-# Quantities of a state: unit, text, everyday unit.
+# Quantities of a state, whose units are those of the evolution.
 NUMBERS = {
-    "cycles": ("1", "cycles under the force that wears", ""),
-    "depth": ("mm", "largest depth worn, both bodies together", ""),
-    "volume": ("mm^3", "volume worn, both bodies together", ""),
-    "energy": ("N mm", "energy dissipated so far", ""),
-    "area": ("mm^2", "contact area at rest", ""),
-    "touching": ("1", "nodes in contact at rest", ""),
-    "peak_pressure": ("MPa", "largest pressure at rest", ""),
-    "stiffness": ("N/mm", "tangential stiffness", "N/um"),
-    "stroke": ("mm", "stroke under the force that wears", ""),
-    "frequency": ("Hz", "frequency of the motion that wears", ""),
-    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+    "cycles": "cycles under the force that wears",
+    "depth": "largest depth worn, both bodies together",
+    "volume": "volume worn, both bodies together",
+    "energy": "energy dissipated so far",
+    "area": "contact area at rest",
+    "touching": "nodes in contact at rest",
+    "peak_pressure": "largest pressure at rest",
+    "stiffness": "tangential stiffness",
+    "stroke": "stroke under the force that wears",
+    "frequency": "frequency of the motion that wears",
+    "energy_per_cycle": "energy dissipated in a cycle",
 }
 # Parts of the error of each quantity, which add up, and a description of that error.
 ERRORS = {
@@ -55,21 +57,21 @@ CURVES = (
 
 def main_results(case: VibrationWearCaseBase, summary: Summary) -> list[SummaryQuantity]:
     """Return results of every state, the unworn one first."""
-    states = enumerate(summary["states"])
-    return reported(
-        summary, chain.from_iterable(_of_state(n, state, summary) for n, state in states)
-    )
+    declared = layout_of(case.amount).datasets("evolution")
+    states = range(len(summary["states"]))
+    return reported(summary, chain.from_iterable(_of_state(n, declared, summary) for n in states))
 
 
-def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[SummaryQuantity]:
+def _of_state(number: int, declared: Declarations, summary: Summary) -> Iterator[SummaryQuantity]:
+    state = summary["states"][number]
     ends = number == len(summary["states"]) - 1
     begun = f"after {times(state['cycles'])} cycles" if state["cycles"] else "unworn"
     group = "at the end" if ends else begun
     place = f"states.{number}"
-    of = partial(SummaryQuantity, group)
-    for name, (unit, text, everyday) in NUMBERS.items():
-        known = _error(name, place, summary)
-        yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
+    for name, text in NUMBERS.items():
+        unit, known = declared[name].unit, _error(name, place, summary)
+        everyday = everyday_unit(unit, name)
+        yield SummaryQuantity(group, text, f"{place}.{name}", unit, everyday=everyday, **known)
     for force, response in enumerate(state["responses"]):
         under = f"{group}, {under_in(response)}"
         yield from of_response(under, f"{place}.responses.{force}", response, summary)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from workflow.analyses.vibration.output.outcome import RESPONSES, trend
+from workflow.analyses.vibration.output.outcome import trend
 from workflow.analyses.vibration.output.results import put_response_curves
 from workflow.analyses.vibration_wear.case import (
     FrictionRigWearCase,
@@ -15,11 +15,6 @@ from workflow.analyses.vibration_wear.case import (
 )
 from workflow.analyses.vibration_wear.output.layout import layout_of
 from workflow.analyses.vibration_wear.output.outcome import (
-    EVOLUTION,
-    NODES,
-    PLACES,
-    POSITION,
-    WORN,
     VibrationWearContents,
     VibrationWearOutcome,
     WornNodes,
@@ -27,18 +22,17 @@ from workflow.analyses.vibration_wear.output.outcome import (
 )
 from workflow.layout.declared import Arrays, Layout
 from workflow.models.vibration.amount import ExcitationSize
+from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish
-from workflow.shell.output.tables import DIGITS, heading, write_curves, write_table
+from workflow.shell.output.tables import DIGITS, heading, write_table
 
 VibrationWearRun = Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]
 
 # Quantities whose trend is reported, in addition to the resonance under the least force.
 TRENDS = ("stiffness", "peak_pressure", "touching")
-# N mm to J, N/mm to N/µm, mm to µm.
-TO_JOULES, PER_MICRON, TO_MICRONS = 1e-3, 1e-3, 1e3
 
 
 def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
@@ -62,7 +56,7 @@ def _contents(outcome: VibrationWearOutcome) -> VibrationWearContents:
     known = outcome.nodes.arrays
     on_plane = "x" in known
     return VibrationWearContents(
-        at_nodes=True, placed=on_plane or POSITION in known, on_plane=on_plane
+        at_nodes=True, placed=on_plane or "position" in known, on_plane=on_plane
     )
 
 
@@ -79,23 +73,20 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
         if outcome.grid is not None:
             writer.put_grid("grid", outcome.grid)
         if outcome.nodes is not None:
-            writer.put(PLACES, {**outcome.nodes.arrays, **_named(outcome.nodes)})
-        evolution = _evolution(outcome, layout)
-        writer.put(EVOLUTION, evolution)
-        path = folder.reserve(f"{EVOLUTION}.csv", "contact and resonances, over the cycles")
-        write_curves(path, evolution, layout.datasets(EVOLUTION))
+            writer.put("places", {**outcome.nodes.arrays, **_named(outcome.nodes)})
+        path = folder.reserve("evolution.csv", "contact and resonances, over the cycles")
+        writer.put_table(path, "evolution", _evolution(outcome, layout))
         for number, state in enumerate(outcome.states):
-            place = f"{WORN}/{number:05d}"
+            place = f"worn/{number:05d}"
             writer.put(place, {}, **state.numbers)
             for group, arrays in state.fields.items():
                 writer.put(f"{place}/{group}", arrays)
             for force, response in enumerate(state.responses):
-                where = f"{place}/{RESPONSES}/{force:05d}"
-                put_response_curves(writer, where, case.amount, response)
+                where = f"{place}/responses/{force:05d}"
                 under = f"{case.amount.under(response.force)} after {state.cycles:g} cycles"
                 what = f"response {under}, over frequency"
                 path = folder.reserve(f"frf_{number:05d}_{force:05d}.csv", what)
-                write_curves(path, response.curves, layout.datasets(where))
+                put_response_curves(writer, path, where, case.amount, response)
             if outcome.nodes is not None:
                 _write_nodes(outcome.nodes, number, state, folder, layout)
 
@@ -110,7 +101,7 @@ def _evolution(outcome: VibrationWearOutcome, layout: Layout) -> Arrays:
         }
         for state in outcome.states
     ]
-    declared = layout.datasets(EVOLUTION)
+    declared = layout.datasets("evolution")
     return {name: np.array([row[name] for row in rows]) for name in declared if name in rows[0]}
 
 
@@ -124,10 +115,10 @@ def _write_nodes(
 ) -> None:
     """Write depths and energies of the nodes in a state, a row for each node."""
     what = f"nodes after {state.cycles:g} cycles: gaps, depths, energies of a cycle"
-    path = folder.reserve(f"{NODES}_{number:05d}.csv", what)
+    path = folder.reserve(f"nodes_{number:05d}.csv", what)
     columns: dict[str, Any] = {heading("point", ""): nodes.names} if nodes.names else {}
-    declared = {**layout.datasets(PLACES), **layout.datasets(f"{WORN}/-/{NODES}")}
-    for name, array in {**nodes.arrays, **state.fields[NODES]}.items():
+    declared = {**layout.datasets("places"), **layout.datasets("worn/-/nodes")}
+    for name, array in {**nodes.arrays, **state.fields["nodes"]}.items():
         by_axis = array.reshape(len(array), -1).T
         axes = "xyz" if len(by_axis) > 1 else ("",)
         for axis, values in zip(axes, by_axis, strict=True):
@@ -157,7 +148,7 @@ def _of_state(amount: ExcitationSize, state: WornRig) -> dict[str, Any]:
     responses = [{amount.name: response.force, **response.numbers} for response in state.responses]
     # JSON has no NaN.
     numbers = {name: value for name, value in state.numbers.items() if value == value}
-    return {**numbers, RESPONSES: responses}
+    return {**numbers, "responses": responses}
 
 
 def _line(amount: ExcitationSize, state: WornRig) -> str:

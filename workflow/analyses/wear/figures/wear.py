@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import partial
 from typing import Any
 
 import h5py
@@ -40,6 +39,7 @@ from workflow.pictures.panels import (
     legend_below,
     new_figure,
     panel_rows,
+    present,
     shaded,
     volume_unit,
 )
@@ -82,9 +82,7 @@ def figures_of(contents: WearContents) -> Figures:
         "subsurface_stress": (subsurface_stress, contents.sections),
         "fretting_life": (fretting_life, bool(contents.cracking)),
     }
-    return {
-        name: partial(draw, contents=contents) for name, (draw, there) in drawn.items() if there
-    }
+    return present(drawn, contents)
 
 
 # --- pressure -----------------------------------------------------------------------------------
