@@ -98,12 +98,12 @@ def found(version: str) -> str | None:
     """
     name = f"python{version}"
     beside = Path(sys.base_prefix).parent.glob(f"{version}.*/bin/{name}")
-    for candidate in (sys.executable, shutil.which(name), *sorted(beside)):
-        code = "import ensurepip, sys; print('{}.{}'.format(*sys.version_info))"
-        command = [candidate or sys.executable, "-I", "-c", code]
+    code = "import ensurepip, sys; print('{}.{}'.format(*sys.version_info))"
+    for candidate in filter(None, (sys.executable, shutil.which(name), *sorted(beside))):
+        command = [candidate, "-I", "-c", code]
         ended = subprocess.run(command, capture_output=True, text=True, check=False)
         if ended.stdout.strip() == version:
-            return command[0]
+            return str(candidate)
     return None
 
 
@@ -167,18 +167,11 @@ def test_what_is_built_is_complete(release, wheel):
     assert names >= sources | {"LICENSE", "README.md", "pyproject.toml"}
 
 
-@pytest.mark.slow
-@pytest.mark.long
-@pytest.mark.parametrize("version", PYTHONS)
-def test_the_command_works_in_an_empty_environment(version, wheel, request, tmp_path):
-    if version == THIS_PYTHON:
-        folder = request.getfixturevalue("bare")
-    else:
-        folder = tmp_path / "env"
-        environment(folder, version, wheel)
+def check_command(folder: Path, place: Path) -> None:
+    """Check that the command of an environment offers, checks and runs a case."""
 
     def fretscale(*arguments: str) -> str:
-        return python(folder, str(folder / "bin" / "fretscale"), *arguments, cwd=tmp_path)
+        return python(folder, str(folder / "bin" / "fretscale"), *arguments, cwd=place)
 
     assert fretscale("--help").startswith("Usage: fretscale")
     fretscale("new", "bodies", "ball.yaml")
@@ -186,9 +179,16 @@ def test_the_command_works_in_an_empty_environment(version, wheel, request, tmp_
     smaller = ("contact.grid=[16, 16]", "output={figures: false, paraview: false}")
     options = [part for entry in smaller for part in ("--set", entry)]
     fretscale("run", "ball.yaml", "--out", "out", *options)
-    assert (tmp_path / "out" / "summary.json").exists()
-    if version != THIS_PYTHON:
-        shutil.rmtree(folder)
+    assert (place / "out" / "summary.json").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.long
+@pytest.mark.parametrize("version", [name for name in PYTHONS if name != THIS_PYTHON])
+def test_other_pythons_run_the_command(version, wheel, tmp_path):
+    environment(tmp_path / "env", version, wheel)
+    check_command(tmp_path / "env", tmp_path)
+    shutil.rmtree(tmp_path / "env")
 
 
 @pytest.mark.slow
@@ -196,6 +196,7 @@ def test_the_command_works_in_an_empty_environment(version, wheel, request, tmp_
 def test_each_extra_alone_does_its_job(bare, wheel, tmp_path):
     # `make test` and `make docs` begin in a fresh clone with nothing but these two.
     assert JOBS.keys() == {None, *EXTRAS} - {"test", "docs"}
+    check_command(bare, tmp_path)
     for extra, (code, printed) in JOBS.items():
         folder, place = tmp_path / "env", tmp_path / str(extra)
         place.mkdir()
