@@ -1,28 +1,22 @@
 """Reading of files in a separate process.
 
 A damaged file can crash the process that reads it, because gmsh and OpenCASCADE trust its content.
-The separate process ends when the process that started it ends, and ignores Ctrl-C.
 """
 
 from __future__ import annotations
 
-import os
-import pickle
 import signal
 import subprocess
-import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fe_models.interpreter import fresh_python
+from fe_models.interpreter import Process, do_each
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.grouped import GroupedMesh
 
-COMMAND = "from fe_models.readers.reader_process import main; main()"
 # Exit code after signal 9, which the system sends if memory runs out.
 KILLED = -9
 # Limit of the processor time for reading a shape [s], and per megabyte: ten times the usual time.
@@ -64,32 +58,25 @@ def read_in_subprocess(
 
     Raises :class:`MeshError` if it raises anything, or if the file crashes the process.
     """
-    # Its stdin stays open as long as this process lives. Its other output is discarded.
-    with subprocess.Popen(
-        fresh_python(COMMAND),
-        bufsize=0,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    ) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        try:
-            with suppress(BrokenPipeError):
-                pickle.dump((read, path, arguments), process.stdin)
-            answer = process.stdout.read()
-            process.wait()
-        except BaseException:
-            process.kill()
-            raise
-    if process.returncode or not answer:
-        raise MeshError(f"{path}: {_ending(process.returncode)}")
-    mesh = pickle.loads(answer)
-    if isinstance(mesh, MeshError):
+    # What libraries print is discarded.
+    process = Process(stderr=subprocess.DEVNULL)
+    try:
+        process.tell(do_each, ())
+        mesh = process.ask(_read, read, path, *arguments)
+    except (EOFError, OSError) as error:
+        raise MeshError(f"{path}: {_ending(process.exit_code())}") from error
+    finally:
+        process.end()
+    if isinstance(mesh, Exception):
         raise mesh
     assert isinstance(mesh, GroupedMesh)
     return mesh
+
+
+def _read(read: Callable[..., GroupedMesh], path: Path, *arguments: Any) -> GroupedMesh:
+    """Read a file in the separate process."""
+    with reading(path):
+        return read(path, *arguments)
 
 
 @contextmanager
@@ -121,26 +108,3 @@ def _ending(code: int) -> str:
         return "the process that read it was killed, perhaps because memory ran out"
     how = signal.strsignal(-code) if code < 0 else f"exit code {code}"
     return f"gmsh crashed as it read it ({how}): it may be damaged; repair it, or export it again"
-
-
-def main() -> None:
-    """Read the file that stdin names, and write the mesh or the error to stdout."""
-    # Redirect what libraries print, so that it does not mix with the answer.
-    answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    read, path, arguments = pickle.load(sys.stdin.buffer)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    mesh: GroupedMesh | MeshError
-    try:
-        with reading(path):
-            mesh = read(path, *arguments)
-    except MeshError as error:
-        mesh = error
-    with answer:
-        pickle.dump(mesh, answer, protocol=pickle.HIGHEST_PROTOCOL)
-
-
-def _end_with_parent() -> None:
-    """End this process when the other end of stdin closes; nothing more is ever written to it."""
-    os.read(0, 1)
-    os._exit(1)

@@ -21,12 +21,13 @@ from typing import Any
 
 import h5py
 
+from fe_models.interpreter import attempt
 from sa_solver.types import Progress, Tally, unseen
 from workflow.case.sections import Output
 from workflow.shell.analysis import Pictures, Share
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.isolation import Isolation
-from workflow.shell.processes import Task, WorkerProcess, attempt, share_out
+from workflow.shell.processes import Task, WorkerProcess, share_out
 
 
 def write_pictures(

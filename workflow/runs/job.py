@@ -1,36 +1,29 @@
 """One run of many: its folder, and the separate process that computes it.
 
-The process and its contact workers end when the process that started them ends, in whatever way.
 After an interruption :func:`workflow.runs.run.bring_to_end` resumes the run from its folder.
 """
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
-import threading
 import traceback
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
+from typing import IO, Any
 
-from fe_models.interpreter import fresh_python
+from fe_models.interpreter import Process, do_each
 from sa_solver.errors import FretscaleError
 from workflow.case.sections import Case
-from workflow.errors import MethodFailed, UserError, one_line
+from workflow.errors import UserError, one_line
 from workflow.kinds import load_case
 from workflow.runs.run import bring_to_end
 from workflow.shell.folders.folder import OutputFolder
-from workflow.shell.processes import THREAD_SETTINGS
 
 # Seconds between two checks of whether a run is still wanted.
 LOOK = 0.2
-# Code that the process runs; its only argument is the job.
-COMMAND = "from workflow.runs.job import main; main()"
 
 
 @dataclass(frozen=True)
@@ -59,32 +52,19 @@ class Finished:
 # --- in the process that computes ---------------------------------------------------------------
 
 
-def main() -> None:
-    """Compute the job given as the only argument, and report on stdout how it ended."""
-    # Output of libraries goes to stderr, because stdout is for the answer.
-    answer = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    arguments = json.loads(sys.argv[1])
-    job = Job(arguments["name"], Path(arguments["case"]), tuple(arguments["overrides"]))
-    root, error = Path(arguments["out"]) / job.name, ""
+def _compute(job: Job, out: Path, take_over: bool) -> str:
+    """Compute a job; return the error in one line, or "" if there is none."""
+    root = out / job.name
     try:
-        bring_to_end(job.load(), root, arguments["take_over"])
+        bring_to_end(job.load(), root, take_over)
     except FretscaleError as ending:
-        error = str(ending)
+        return one_line(ending)
     except Exception as ending:
-        error = f"{type(ending).__name__}: {ending}"
         # What one line cannot say is kept in the log of the run.
         with suppress(OSError), OutputFolder(root).reserve_log().open("a", encoding="utf-8") as log:
             log.write(traceback.format_exc())
-    answer.write(json.dumps({"error": error}))
-    answer.close()
-
-
-def _end_with_parent() -> None:
-    """End this process when stdin, to which nobody writes, is closed by the end of the parent."""
-    os.read(0, 1)
-    os._exit(1)
+        return one_line(f"{type(ending).__name__}: {ending}")
+    return ""
 
 
 # --- in the process that waits ------------------------------------------------------------------
@@ -99,57 +79,32 @@ def run_job(
 ) -> str:
     """Compute a job in a new process; return the error in one line, or "" if there is none.
 
-    The process is ended if ``abandoned`` returns true. It has a separate process group, so that
-    only
-    the waiting process receives Ctrl-C. For ``take_over`` see
+    The process is ended if ``abandoned`` returns true. For ``take_over`` see
     :func:`workflow.shell.folders.lock.locked`.
     """
-    arguments = asdict(job) | {"case": str(job.case.absolute()), "out": str(out.absolute())}
-    arguments["take_over"] = take_over
-    # Held open as long as this process lives: its end is the end of the other.
-    theirs, lifeline = os.pipe()
-    try:
-        process = subprocess.Popen(
-            [*fresh_python(COMMAND), json.dumps(arguments)],
-            stdin=theirs,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            errors="replace",
-            env=os.environ | (dict.fromkeys(THREAD_SETTINGS, "1") if one_thread else {}),
-            start_new_session=True,
-        )
+    with TemporaryFile() as stderr, ThreadPoolExecutor(1) as waiting:
+        process = Process(one_thread, stderr)
         try:
-            return _ending(process, *_wait(process, abandoned))
+            process.tell(do_each, ())
+            absolute = replace(job, case=job.case.absolute())
+            answer = waiting.submit(process.ask, _compute, absolute, out.absolute(), take_over)
+            while not wait([answer], LOOK).done:
+                if abandoned():
+                    process.end()
+            return one_line(answer.result())
+        except (EOFError, OSError):
+            return _ending(process.exit_code(), stderr)
         finally:
-            process.kill()
-            process.wait()
-    finally:
-        os.close(theirs)
-        os.close(lifeline)
+            process.end()
 
 
-def _wait(process: subprocess.Popen[str], abandoned: Callable[[], bool]) -> tuple[str, str]:
-    """Wait for the end of the process, and return what it wrote to stdout and stderr."""
-    while True:
-        try:
-            return process.communicate(timeout=LOOK)
-        except subprocess.TimeoutExpired:
-            if abandoned():
-                process.kill()
-
-
-def _ending(process: subprocess.Popen[str], answer: str, stderr: str) -> str:
-    """Return why the job failed, in one line, or "" if it did not."""
-    if process.returncode == 0 and answer:
-        return one_line(json.loads(answer)["error"])
-    if process.returncode < 0:
-        number = -process.returncode
-        return str(
-            MethodFailed(f"the process of this run got signal {number}: did it run out of memory?")
-        )
-    last = (stderr.strip().splitlines() or ["no message"])[-1]
-    return f"the process of this run ended with exit code {process.returncode}: {last}"
+def _ending(code: int, stderr: IO[bytes]) -> str:
+    """Return why a process has ended without an answer, in one line."""
+    if code < 0:
+        return f"the process of this run got signal {-code}: did it run out of memory?"
+    stderr.seek(0)
+    last = (stderr.read().decode(errors="replace").strip().splitlines() or ["no message"])[-1]
+    return f"the process of this run ended with exit code {code}: {last}"
 
 
 def finished(job: Job, out: Path, error: str) -> Finished:

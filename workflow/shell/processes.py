@@ -1,17 +1,9 @@
-"""Processes that work together with the main one: workers that answer calls, and background jobs.
-
-Each process ends with its parent, however the parent ends, and leaves Ctrl-C to it. Each is a
-fresh Python that receives messages on stdin and answers on stdout. The multiprocessing module would
-instead run the parent's ``__main__`` again, which may have no guard, or be a notebook.
-"""
+"""Work in separate processes: workers that answer calls together, and jobs in the background."""
 
 from __future__ import annotations
 
 import os
 import pickle
-import signal
-import subprocess
-import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -21,15 +13,8 @@ from functools import partial
 from queue import SimpleQueue
 from typing import IO, Any
 
-from fe_models.interpreter import fresh_python
+from fe_models.interpreter import Process, attempt, do_each, write_message
 from workflow.errors import MethodFailed
-
-# The workers share the cores among themselves; threads inside each would compete for them.
-THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-COMMAND = "from workflow.shell.processes import main; main()"
-# Number of bytes that hold the length of a message.
-LENGTH = 8
-
 
 Task = tuple[Callable[..., Any], tuple[Any, ...]]
 """A function that can be pickled, and its arguments."""
@@ -43,41 +28,6 @@ Done = Callable[[], None]
 
 def _ignore_progress() -> None:
     """Ignore the report of progress."""
-
-
-class Process:
-    """Worker process, seen from its parent; with ``one_thread`` its libraries use one thread."""
-
-    def __init__(self, one_thread: bool = False) -> None:
-        self._process = subprocess.Popen(
-            fresh_python(COMMAND),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=os.environ | (dict.fromkeys(THREAD_SETTINGS, "1") if one_thread else {}),
-            start_new_session=True,
-        )
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._questions, self._answers = self._process.stdin, self._process.stdout
-
-    def tell(self, *message: Any) -> None:
-        """Send a message. Raises :class:`MethodFailed` if the process has ended."""
-        try:
-            _write(self._questions, message)
-        except OSError as error:
-            raise _worker_gone(error) from error
-
-    def answer(self) -> Any:
-        """Wait for the next answer. Raises :class:`MethodFailed` if the process has ended."""
-        try:
-            return pickle.loads(_read(self._answers))
-        except (EOFError, OSError) as error:
-            raise _worker_gone(error) from error
-
-    def end(self) -> None:
-        """Kill the process, busy or not."""
-        self._process.kill()
-        self._process.communicate()
 
 
 class Workers:
@@ -105,7 +55,8 @@ class Workers:
         """
         shares = zip(*arguments, strict=True)
         for process, share in zip(self._processes, shares, strict=True):
-            process.tell(method, share)
+            with _watched():
+                process.tell(method, share)
         return partial(_answers, [_Hearing(process, done) for process in self._processes])
 
 
@@ -116,10 +67,17 @@ def workers(make: Callable[[Any, Done], Answering], settings: Sequence[Any]) -> 
     ``make`` is called in the worker; its second argument is a function that reports that a part of
     the work is done.
     """
-    with _processes(
-        _serve, [(make, setting) for setting in settings], one_thread=True
-    ) as processes:
+    processes: list[Process] = []
+    try:
+        for _ in settings:
+            processes.append(Process(one_thread=True))
+        for process, setting in zip(processes, settings, strict=True):
+            with _watched():
+                process.tell(_serve, (make, setting))
         yield Workers(processes)
+    finally:
+        for process in processes:
+            process.end()
 
 
 class WorkerProcess:
@@ -139,7 +97,8 @@ class WorkerProcess:
         """
         if self._process is None:
             self._process = Process(one_thread=True)
-            self._process.tell(_do_each, ())
+            with _watched():
+                self._process.tell(do_each, ())
         return self._asking.submit(_asked, self._process, function, arguments).result
 
     def close(self) -> None:
@@ -196,28 +155,22 @@ def share_out(
 
 def _asked(process: Process, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
     """Send a function to a process and return its answer, or raise its exception."""
-    process.tell(function, arguments)
-    answer = process.answer()
+    with _watched():
+        answer = process.ask(function, *arguments)
     if isinstance(answer, Exception):
         raise answer
     return answer
 
 
 @contextmanager
-def _processes(
-    target: Callable[..., None], arguments: Sequence[tuple[Any, ...]], one_thread: bool = False
-) -> Iterator[list[Process]]:
-    """Yield processes that run ``target``, and end them, busy or not, at the end."""
-    processes: list[Process] = []
+def _watched() -> Iterator[None]:
+    """Raise :class:`MethodFailed` if a process to which something is sent has ended."""
     try:
-        for _ in arguments:
-            processes.append(Process(one_thread))
-        for process, parts in zip(processes, arguments, strict=True):
-            process.tell(target, parts)
-        yield processes
-    finally:
-        for process in processes:
-            process.end()
+        yield
+    except (EOFError, OSError) as error:
+        raise MethodFailed(
+            f"a process of the run is gone ({type(error).__name__}): did it run out of memory?"
+        ) from error
 
 
 class _Done:
@@ -237,11 +190,15 @@ class _Hearing:
 
     def _listen(self) -> None:
         try:
-            while isinstance(printed := self._process.answer(), _Done):
+            while isinstance(answer := self._next(), _Done):
                 self._done()
-            self._answer = printed
+            self._answer = answer
         except Exception as error:
             self._worker_gone = error
+
+    def _next(self) -> Any:
+        with _watched():
+            return self._process.answer()
 
     def answer(self) -> Any:
         """Wait for the answer and return it."""
@@ -260,64 +217,6 @@ def _answers(hearings: list[_Hearing]) -> list[Any]:
     return answers
 
 
-def _worker_gone(error: Exception) -> MethodFailed:
-    return MethodFailed(
-        f"a process of the run is gone ({type(error).__name__}): did it run out of memory?"
-    )
-
-
-# --- messages: their length, followed by the pickled content --------------------------------------
-
-
-def _write(stream: IO[bytes], message: Any) -> None:
-    data = pickle.dumps(message)
-    stream.write(len(data).to_bytes(LENGTH, "little"))
-    stream.write(data)
-    stream.flush()
-
-
-def _read(stream: IO[bytes]) -> bytes:
-    """Return a message, still pickled. Raises EOFError if the other end has closed."""
-    length = int.from_bytes(_bytes(stream, LENGTH), "little")
-    return _bytes(stream, length)
-
-
-def _bytes(stream: IO[bytes], number: int) -> bytes:
-    data = stream.read(number)
-    if len(data) < number:
-        raise EOFError
-    return data
-
-
-# --- in the process -------------------------------------------------------------------------------
-
-
-def main() -> None:
-    """Run the function received on stdin, and leave Ctrl-C to the parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Output of libraries is not part of the answer. It goes to stderr line by line, because a
-    # buffer would be lost when the parent ends this process.
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    sys.stdout = sys.stderr
-    messages: SimpleQueue[bytes] = SimpleQueue()
-    threading.Thread(target=_listen, args=(messages,), daemon=True).start()
-    # Unpickled here, because modules imported with a message may need the main thread.
-    target, parts = pickle.loads(messages.get())
-    target(messages, answers, *parts)
-
-
-def _listen(messages: SimpleQueue[bytes]) -> None:
-    """Receive messages of the parent; end this process with the parent, even while it is busy."""
-    # Not sys.stdin: the end of this process would wait for its lock.
-    with os.fdopen(os.dup(0), "rb") as questions:
-        try:
-            while True:
-                messages.put(_read(questions))
-        finally:
-            os._exit(1)
-
-
 def _serve(
     messages: SimpleQueue[bytes],
     answers: IO[bytes],
@@ -325,32 +224,13 @@ def _serve(
     settings: Any,
 ) -> None:
     """Answer calls, one after the other, and report which parts are done."""
-    answering = attempt(make, (settings, lambda: _write(answers, _Done())))
+    answering = attempt(make, (settings, lambda: write_message(answers, _Done())))
     while True:
         method, arguments = pickle.loads(messages.get())
         if isinstance(answering, Exception):
-            _write(answers, answering)
+            write_message(answers, answering)
         else:
-            _write(answers, attempt(answering, (method, *arguments)))
-
-
-def _do_each(messages: SimpleQueue[bytes], answers: IO[bytes]) -> None:
-    """Run functions, one after the other, and answer with what each returned or raised."""
-
-    def run(message: bytes) -> Any:
-        function, arguments = pickle.loads(message)
-        return function(*arguments)
-
-    while True:
-        _write(answers, attempt(run, (messages.get(),)))
-
-
-def attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """Return what the function returned or, as a value, what it raised."""
-    try:
-        return function(*arguments)
-    except Exception as error:
-        return error
+            write_message(answers, attempt(answering, (method, *arguments)))
 
 
 @contextmanager

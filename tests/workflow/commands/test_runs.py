@@ -14,17 +14,18 @@ import h5py
 import numpy as np
 import pytest
 
+from fe_models import interpreter
 from tests.workflow.command_line import jobs_here
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow.analyses.contact.case import ContactCase
 from workflow.errors import MethodFailed, UserError
 from workflow.kinds import load_case
-from workflow.runs import job as runs_job
 from workflow.runs.job import Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.provenance import provenance_of
 from workflow.runs.run import stored_run
 from workflow.shell.folders.folder import OutputFolder
+from workflow.shell.folders.lock import LOCK
 
 QUIET = "output: {paraview: false, figures: false}\n"
 # Jumps of some hundredths of a second each, so that a moment among them is easily met.
@@ -135,7 +136,7 @@ def test_names_are_folders_of_their_own(contact, tmp_path, names):
     ],
 )
 def test_a_process_that_ends_early_is_a_failure(contact, tmp_path, monkeypatch, code, reported):
-    monkeypatch.setattr(runs_job, "COMMAND", code)
+    monkeypatch.setattr(interpreter, "COMMAND", code)
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     assert done.summary is None
     assert reported in done.error
@@ -143,19 +144,19 @@ def test_a_process_that_ends_early_is_a_failure(contact, tmp_path, monkeypatch, 
 
 @pytest.mark.slow
 def test_a_mistake_of_the_program_leaves_its_traceback_in_the_log(contact, tmp_path, monkeypatch):
-    code = "import workflow.analyses.contact.run as c; c.bodies_of = None;" + runs_job.COMMAND
-    monkeypatch.setattr(runs_job, "COMMAND", code)
+    code = "import workflow.analyses.contact.run as c; c.bodies_of = None;" + interpreter.COMMAND
+    monkeypatch.setattr(interpreter, "COMMAND", code)
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     assert done.error == "TypeError: 'NoneType' object is not callable"
     assert "Traceback" in (done.folder / "run.log").read_text("utf-8")
 
 
 def test_jobs_have_one_thread_each(contact, tmp_path, monkeypatch):
-    names = list(runs_job.THREAD_SETTINGS)
+    names = list(interpreter.THREAD_SETTINGS)
     for name in names:
         monkeypatch.setenv(name, "7")
     code = f"import os; raise SystemError([os.environ[name] for name in {names}])"
-    monkeypatch.setattr(runs_job, "COMMAND", code)
+    monkeypatch.setattr(interpreter, "COMMAND", code)
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     assert done.error.endswith(f"SystemError: {['1'] * len(names)}")
 
@@ -203,8 +204,8 @@ run_jobs([Job("one", Path(case), tuple(overrides))], Path(out), processes=1)
 def start(*arguments):
     # Its job keeps every step as it ends.
     often = "from workflow.shell.folders import steps; steps.SHARE = float('inf')"
-    every = f"{often}; {runs_job.COMMAND}"
-    code = f"from workflow.runs import job\njob.COMMAND = {every!r}\n{RUN}"
+    every = f"{often}; {interpreter.COMMAND}"
+    code = f"from fe_models import interpreter\ninterpreter.COMMAND = {every!r}\n{RUN}"
     command = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.Popen(command, stderr=subprocess.PIPE, start_new_session=True)
 
@@ -238,10 +239,10 @@ def waits(pid):
 
 
 WAIT = """
-import threading, time
-from workflow.runs.job import _end_with_parent
-threading.Thread(target=_end_with_parent, daemon=True).start()
-time.sleep(600)
+import time
+from fe_models import interpreter
+interpreter.do_each = lambda messages, answers: time.sleep(600)
+interpreter.main()
 """
 
 
@@ -249,7 +250,7 @@ time.sleep(600)
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_a_job_ends_with_whoever_waits_for_it(contact, tmp_path):
     """The job ends however the waiting process ends."""
-    code = f"from workflow.runs import job\njob.COMMAND = {WAIT!r}\n{RUN}"
+    code = f"from fe_models import interpreter\ninterpreter.COMMAND = {WAIT!r}\n{RUN}"
     process = subprocess.Popen([sys.executable, "-c", code, contact, tmp_path / "out"])
     # Libraries start short processes of their own while they are imported.
     (job,) = wait_until(lambda: [pid for pid in below(process.pid) if waits(pid)])
@@ -440,8 +441,7 @@ def kill_at_work(workers, folder):
     """Kill the worker that runs the job of the folder, after some jumps."""
     wait_until((folder / "jumps/00005.h5").exists)
     for worker in workers:
-        commands = [Path(f"/proc/{pid}/cmdline").read_text() for pid in below(worker)]
-        if any(f'"{folder.name}"' in command for command in commands):
+        if json.loads((folder / LOCK).read_text())["process"] in below(worker):
             os.kill(worker, signal.SIGKILL)
             return worker
     return None

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from fe_models import interpreter
 from tests.workflow.command_line import AS_PROCESS
 from tests.workflow.shell.interruptions import PATIENCE, assert_equal, jumps_kept, posix_only
 from workflow.analyses.wear import contact_workers
@@ -89,7 +90,7 @@ def alive(pid: int) -> bool:
 def works(pid: int) -> bool:
     """Return whether it is a worker: libraries also start short processes while imported."""
     try:
-        return workers.COMMAND.encode() in Path(f"/proc/{pid}/cmdline").read_bytes()
+        return interpreter.COMMAND.encode() in Path(f"/proc/{pid}/cmdline").read_bytes()
     except OSError:
         return False
 

@@ -61,7 +61,7 @@ def left_by(out, host, process=1):
     """Write the lock of a process that has ended, with the number of a running one."""
     out.mkdir(exist_ok=True)
     reported = {"process": process, "host": host, "since": "2026-01-02 03:04:05"}
-    (out / LOCK).write_text(json.dumps(reported))
+    (out / LOCK).write_text(" " + json.dumps(reported))
 
 
 def killed(process):
@@ -145,10 +145,10 @@ def test_a_lock_of_another_machine_is_for_whoever_knows_it(out):
 
 @posix_only
 def test_without_locks_of_the_system_what_is_written_counts(out, monkeypatch):
-    def refuse(*_):
+    def refuse(*_, **__):
         raise OSError("no locks available")
 
-    monkeypatch.setattr(lock.fcntl, "flock", refuse)
+    monkeypatch.setattr(lock, "lock_descriptor", refuse)
     with (
         locked(out),
         pytest.raises(UserError, match="apparently in use by"),

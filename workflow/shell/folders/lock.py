@@ -12,17 +12,15 @@ import json
 import os
 import socket
 import stat
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from filelock import lock_descriptor
+
 from workflow.errors import UserError
 from workflow.shell.folders.store import check_regular
-
-if sys.platform != "win32":
-    import fcntl
 
 LOCK = ".fretscale.lock"
 # Seconds between two checks of a lock that another process holds.
@@ -32,6 +30,9 @@ LOOK = 0.2
 MOST_REMOVED = 1000
 # A link is not followed: its target does not belong to us.
 FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+# The name of the holder follows the first byte: Windows locks that byte, and lets nobody else read
+# it.
+NAME = 1
 
 
 @contextmanager
@@ -44,6 +45,7 @@ def locked(root: Path, patience: float = 0.0, take_over: bool = False) -> Iterat
     fresh = not _is_folder(root)
     path = root / LOCK
     file, alone = _opened(path, patience)
+    taken = False
     try:
         left = _read(file)
         holder = _holder(left)
@@ -52,13 +54,11 @@ def locked(root: Path, patience: float = 0.0, take_over: bool = False) -> Iterat
                 f"{root}: apparently in use by {holder}; wait for its end, or remove {path} if it "
                 "is gone"
             )
-        try:
-            _write(file, path)
-            yield f"{holder} is gone and left its lock on {root}, which is removed" if left else ""
-        finally:
-            path.unlink(missing_ok=True)
+        taken = True
+        _write(file, path)
+        yield f"{holder} is gone and left its lock on {root}, which is removed" if left else ""
     finally:
-        os.close(file)
+        _close(file, path if taken else None)
         if fresh:
             with suppress(OSError):  # not empty: something was written
                 root.rmdir()
@@ -92,30 +92,46 @@ def _opened(path: Path, patience: float) -> tuple[int, bool]:
                 raise OSError(error.errno, error.strerror, str(path.parent)) from error
             continue
         try:
-            if sys.platform != "win32":
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            holder = _holder(_read(file))
-            os.close(file)
-            if time.monotonic() >= end:
-                raise UserError(
-                    f"{path.parent}: in use by {holder}; wait for its end, or give another folder"
-                ) from None
-            time.sleep(LOOK)
-            continue
+            alone = lock_descriptor(file, blocking=False)
         except OSError:  # a file system without locks
             return file, False
-        # The last holder may have removed the file meanwhile, and another one may exist by now.
-        with suppress(OSError):
-            if sys.platform == "win32" or os.path.samestat(os.fstat(file), path.stat()):
-                return file, sys.platform != "win32"
+        if alone:
+            # The last holder may have removed the file meanwhile, and another one may exist by now.
+            with suppress(OSError):
+                if os.path.samestat(os.fstat(file), path.stat()):
+                    return file, True
+            os.close(file)
+            continue
+        holder = _holder(_read(file))
         os.close(file)
+        if time.monotonic() >= end:
+            raise UserError(
+                f"{path.parent}: in use by {holder}; wait for its end, or give another folder"
+            )
+        time.sleep(LOOK)
+
+
+def _close(file: int, path: Path | None) -> None:
+    """Close the lock file, and remove it if its ``path`` is given."""
+    kept = path
+    try:
+        # Removed while it is still locked: afterwards it may belong to another process.
+        if path is not None:
+            with suppress(PermissionError):
+                path.unlink(missing_ok=True)
+                kept = None
+    finally:
+        os.close(file)
+    # Windows removes only a closed file, and none that another process has opened meanwhile.
+    if kept is not None:
+        with suppress(OSError):
+            kept.unlink()
 
 
 def _read(file: int) -> dict[str, object]:
     """Return what the holder wrote; empty if it has not written anything yet."""
     try:
-        os.lseek(file, 0, os.SEEK_SET)
+        os.lseek(file, NAME, os.SEEK_SET)
         content = json.loads(os.read(file, 4096))
     except ValueError:
         return {}
@@ -134,7 +150,7 @@ def _write(file: int, path: Path) -> None:
     try:
         os.ftruncate(file, 0)
         os.lseek(file, 0, os.SEEK_SET)
-        os.write(file, json.dumps(content).encode())
+        os.write(file, b" " * NAME + json.dumps(content).encode())
     except OSError as error:
         error.filename = str(path)
         raise
