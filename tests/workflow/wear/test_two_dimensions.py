@@ -209,7 +209,7 @@ def slot(small_path):
         source,
         stages,
         [
-            stage.begin(history, case.wear.cycles)[0]
+            stage.contact.begin(history, case.wear.cycles)[0]
             for stage, history in zip(stages, source.unworn(), strict=True)
         ],
     )

@@ -17,10 +17,9 @@ from fe_models.meshes.transfer import FaceTransfer
 from fe_models.structure import InterfaceHistory
 from sa_solver.cycles.increments import friction_work
 from sa_solver.types import Array
-from wear.contact.interface import InterfaceState
 from workflow.case.text.plain import shares
 from workflow.case.text.readable import percent
-from workflow.models.contact import FaceContact
+from workflow.models.contact import FaceContact, FaceState
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 
@@ -111,7 +110,7 @@ class Uniformity:
 
 
 def uniformities(
-    source: LoadSource, stages: Sequence[FaceContact], states: Sequence[InterfaceState]
+    source: LoadSource, stages: Sequence[FaceContact], states: Sequence[FaceState]
 ) -> dict[str, Uniformity]:
     """Return the uniformity of every loaded contact of a 3D structure, by interface."""
     if not isinstance(source, StructureLoads) or source.line:
@@ -124,7 +123,7 @@ def uniformities(
 
 
 def uniformity(
-    stage: FaceContact, history: InterfaceHistory, state: InterfaceState, peak: int
+    stage: FaceContact, history: InterfaceHistory, state: FaceState, peak: int
 ) -> Uniformity | None:
     """Return the uniformity of unworn contact and wear so far; None without load in the middle."""
     carried = sections(stage.transfer, history, peak, stage.settings.friction(0.0))

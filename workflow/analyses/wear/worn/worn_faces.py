@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from wear.contact.interface import InterfaceState
 from workflow.analyses.wear.worn.worn_nodes import (
     NodalDepths,
     nodal_depths,
@@ -16,7 +15,7 @@ from workflow.analyses.wear.worn.worn_nodes import (
     write_worn_nodes,
 )
 from workflow.case.text.readable import percent
-from workflow.models.contact import FaceContact
+from workflow.models.contact import FaceContact, FaceState
 from workflow.models.loads import LoadSource, UserFace
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.terminal.reporter import Reporter
@@ -28,7 +27,7 @@ FULL_SHARE = 0.99
 def write_worn_faces(
     source: LoadSource,
     stages: Sequence[FaceContact],
-    states: Sequence[InterfaceState],
+    states: Sequence[FaceState],
     folder: OutputFolder,
     reporter: Reporter,
 ) -> dict[str, dict[str, Any]]:
@@ -56,7 +55,7 @@ def write_worn_faces(
     return summary
 
 
-def _worn_nodes(face: UserFace, stage: FaceContact, state: InterfaceState) -> NodalDepths:
+def _worn_nodes(face: UserFace, stage: FaceContact, state: FaceState) -> NodalDepths:
     """Return the worn depth at the user's nodes, on the contact face or at separate points."""
     depth = stage.on_grid(state).depths[face.body - 1]
     if face.points is not None:

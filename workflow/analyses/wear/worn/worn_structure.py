@@ -29,7 +29,7 @@ from workflow.analyses.wear.structures.resultants.writing import put_closure
 from workflow.analyses.wear.worn.bolts import BoltTensions
 from workflow.case.text.readable import percent
 from workflow.layout.declared import Arrays
-from workflow.models.contact import FaceContact
+from workflow.models.contact import FaceContact, FaceState
 from workflow.models.structure import StructureLoads
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.store import replacing
@@ -270,8 +270,8 @@ def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> Array
 
 def worn_structure(
     stage: StructureLoads,
-    contacts: list[FaceContact],
-    state: CoupledState,
+    contacts: Sequence[FaceContact],
+    states: Sequence[FaceState],
     evolves: bool,
     moves: bool,
     folder: OutputFolder,
@@ -282,15 +282,15 @@ def worn_structure(
     If friction ``evolves``, each contact has its coefficient at the end. If the structure
     ``moves``, the surfaces of all bodies over the increments are included.
     """
-    pairs = list(zip(contacts, state.interfaces, strict=True))
-    depths = [contact.depths_of_bodies(interface) for contact, interface in pairs]
+    pairs = list(zip(contacts, states, strict=True))
+    depths = [contact.depths_of_bodies(state) for contact, state in pairs]
     meshed = list(map(meshed_depths, stage.mesh.interfaces, depths))
     # The friction solution uses one thread and represents worn faces by their gaps.
     worn = begun(partial(stage.worn_mesh, meshed))
     with reported_stage(reporter, stage, "structural friction", "increments"):
         cycle = stage.worn_cycle(
-            [contact.nodal_depth(interface) for contact, interface in pairs],
-            [contact.settings.friction(interface.energy) for contact, interface in pairs]
+            [contact.contact.at_nodes(state.surfaces.depth) for contact, state in pairs],
+            [contact.settings.friction(state.energy) for contact, state in pairs]
             if evolves
             else None,
         )
@@ -304,8 +304,8 @@ def worn_structure(
     with reporter.stage("stress", "steps") as reported:
         done = Tally(reported, 2 * steps(len(mesh.bodies)))
         shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
-        states = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
-        stresses = stage.stresses(states, shown, done)
+        cycles = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
+        stresses = stage.stresses(cycles, shown, done)
     return WornStructure(stage, mesh, cycle, stresses, written, shown)
 
 
