@@ -45,7 +45,8 @@ if TYPE_CHECKING:
     from wear.fitting.estimates import Estimate
     from wear.fitting.evolutions import EvolutionData, evolution_problem
     from wear.fitting.least_squares import Fit, fit
-    from wear.fitting.loops import LoopData, loop_data, loop_problem
+    from wear.fitting.loop_samples import LoopData, loop_data
+    from wear.fitting.loops import loop_problem
     from wear.fitting.problem import FitError, FitProblem, FreeParameter, Series
     from wear.fitting.scars import ComputedScars, ScarData, scar_problem
     from wear.fitting.volumes import VolumeData, VolumeLaw, volume_problem
@@ -82,7 +83,8 @@ __getattr__, __dir__ = lazy_names(
         "estimates": ("Estimate",),
         "evolutions": ("EvolutionData", "evolution_problem"),
         "least_squares": ("Fit", "fit"),
-        "loops": ("LoopData", "loop_data", "loop_problem"),
+        "loop_samples": ("LoopData", "loop_data"),
+        "loops": ("loop_problem",),
         "problem": ("FitError", "FitProblem", "Series", "FreeParameter"),
         "scars": ("ComputedScars", "ScarData", "scar_problem"),
         "volumes": ("VolumeData", "VolumeLaw", "volume_problem"),
