@@ -2,10 +2,10 @@
 
 The loop of the law is compared with samples of measured loops (:mod:`wear.fitting.loop_samples`).
 The law follows its steady loop from one turning point to the other. The turning points are fitted
-too, because samples do not lie exactly on them. A constant force of each step of similar loops is fitted as well; it is what
-remains of outer loops in Masing's laws. Samples are weighted by the noise of their force and, where
-the loop is steep, by that of their displacement. The bounds include scatter about the law, but not
-an error of the displacement that is the same in every cycle.
+too, because samples do not lie exactly on them. A constant force of each step of similar loops is
+fitted as well; it is what remains of outer loops in Masing's laws. Samples are weighted by the
+noise of their force and, where the loop is steep, by that of their displacement. The bounds include
+scatter about the law, but not an error of the displacement that is the same in every cycle.
 """
 
 from __future__ import annotations

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol
 
 import numpy as np
 
-from fe_models.meshes.structure_mesh import Face
 from fe_models.meshes.transfer import FaceTransfer
 from sa_solver import checks
 from sa_solver.half_space.operator import HalfSpace
@@ -300,13 +299,9 @@ class FaceContact(Generic[Solution]):
             f"{self._contact_face.remedy}"
         )
 
-    def face_of(self, body: Literal[1, 2]) -> Face:
-        """Return the face of one body, with the nodes of that body."""
-        return self.face.face(body)
-
     def transfer_of(self, body: Literal[1, 2]) -> FaceTransfer:
         """Return the transfer between the face of one body and the grid."""
-        face = self.face_of(body)
+        face = self.face.face(body)
         return self.transfer if face is self.face else FaceTransfer.between(face, self.grid)
 
     def on_grid(self, state: FaceState) -> Surfaces:
@@ -321,6 +316,10 @@ class FaceContact(Generic[Solution]):
         if (to_1 := self.transfer_of(1)) is not self.transfer:
             depth_1 = to_1.to_nodes(self.contact.on_cells(state.surfaces.depth_1))
         return depth_1, depth_2
+
+
+WornFaces = Sequence[tuple[FaceContact, FaceState]]
+"""All contact faces, each with its state."""
 
 
 def border_warnings(stages: Sequence[FaceContact], first: Sequence[FirstContact]) -> Iterator[str]:

@@ -11,7 +11,7 @@ from wear.contact.contacts import Call, Contacts, LoadedContacts, call_in_turn
 from wear.contact.interface import InterfaceContact, InterfaceState
 from wear.contact.tractions import ContactFields
 from wear.coupled_state import CoupledState
-from workflow.models.contact import FaceContact, FaceSolution, FaceState
+from workflow.models.contact import FaceContact, FaceSolution, FaceState, WornFaces
 from workflow.models.loops import TangentialLoops, WornLoop, worn_loop
 
 
@@ -45,25 +45,22 @@ class FaceContacts:
         call = call or partial(call_in_turn, contacts)
         return cls(stages, Contacts(contacts, call), call)
 
-    @property
-    def names(self) -> list[str]:
-        return [stage.name for stage in self.stages]
-
     def states(self, state: CoupledState[Any]) -> Sequence[FaceState]:
         """Return the state of every face."""
         return self.views(state.interfaces)
 
-    def fields(self, states: Sequence[FaceState], increment: int) -> list[ContactFields]:
+    def faces(self, state: CoupledState[Any]) -> WornFaces:
+        """Return every face with its state."""
+        return list(zip(self.stages, self.states(state), strict=True))
+
+    def fields(self, state: CoupledState[Any], increment: int) -> list[ContactFields]:
         """Return tractions and slip of an increment on the present surfaces."""
-        pairs = zip(self.stages, states, strict=True)
-        seen = [_seen(stage, state, increment) for stage, state in pairs]
+        seen = [_seen(stage, of_face, increment) for stage, of_face in self.faces(state)]
         return self.call(partial(_fields, increment=increment), seen)
 
-    def loops(
-        self, states: Sequence[FaceState], peak: int, loops: TangentialLoops
-    ) -> list[WornLoop]:
+    def loops(self, state: CoupledState[Any], peak: int, loops: TangentialLoops) -> list[WornLoop]:
         """Return tangential loops of half-spaces on the present surfaces, at the ``peak`` load."""
-        return self.call(partial(_loop, peak=peak, loops=loops), states)
+        return self.call(partial(_loop, peak=peak, loops=loops), self.states(state))
 
 
 def _seen(stage: FaceContact, state: FaceState, increment: int) -> FaceState:

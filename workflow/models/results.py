@@ -66,11 +66,10 @@ class ResultsRecorder(Observer):
         self._record(after)
 
     def _record(self, state: CoupledState[Any]) -> None:
-        states = self.contacts.states(state)
-        pairs = zip(self.contacts.stages, states, strict=True)
+        faces = self.contacts.faces(state)
         self.cycles.append(float(state.cycles[-1]))
-        self.surfaces.append([contact.on_grid(of_face) for contact, of_face in pairs])
-        self.fields.append(self.contacts.fields(states, self.peak))
+        self.surfaces.append([contact.on_grid(of_face) for contact, of_face in faces])
+        self.fields.append(self.contacts.fields(state, self.peak))
 
 
 @dataclass(frozen=True)
@@ -93,11 +92,10 @@ class WearResults:
         """Return the results as a tree of labelled arrays."""
         import xarray as xr
 
-        contacts = self.recorder.contacts
-        pairs = zip(contacts.stages, contacts.states(self.state), strict=True)
+        worn = self.recorder.contacts.faces(self.state)
         faces = {
             contact.name: self._face(number, contact, state)
-            for number, (contact, state) in enumerate(pairs)
+            for number, (contact, state) in enumerate(worn)
         }
         run = xr.Dataset(
             {"drift": self._variable(RUN["drift"], self._recorded(self.state.drift))},

@@ -62,12 +62,11 @@ class RunLog(Observer):
     def jump_started(self, state: CoupledState[Any], cycles: float) -> None:
         step = self.run.case.wear.step
         if step.kind == "explicit" and step.fraction is None:
-            contacts = self.contacts
-            warn_of_instability(contacts.stages, contacts.states(state), cycles, self.run.reporter)
+            warn_of_instability(self.contacts.faces(state), cycles, self.run.reporter)
 
     def jump_finished(self, before: CoupledState[Any], after: CoupledState[Any]) -> None:
         if self.run.case.contact.method != "nodes":
-            warn_of_growth(self.contacts.stages, self.contacts.states(after), self.run.reporter)
+            warn_of_growth(self.contacts.faces(after), self.run.reporter)
         drift, cost = after.drift[-1], after.cost - before.cost
         if after.solutions > before.solutions:
             self.run.reporter.log(f"drift {percent(drift)}: loads computed again")
@@ -106,16 +105,16 @@ class FileRecorder(Observer):
 
     def record(self, state: CoupledState[Any]) -> None:
         """Write the fields of this jump."""
-        states, loops = self.contacts.states(state), self._loops(state)
+        faces, loops = self.contacts.faces(state), self._loops(state)
         with self.run.reporter.stage("checkpoints"):
-            recorded = self.contacts.fields(states, self.peak)
+            recorded = self.contacts.fields(state, self.peak)
             arrays: dict[str, Array] = {}
-            for stage, face, fields in zip(self.contacts.stages, states, recorded, strict=True):
+            for (stage, of_face), fields in zip(faces, recorded, strict=True):
                 name = stage.name
-                for body, height in enumerate(stage.on_grid(face).heights, start=1):
+                for body, height in enumerate(stage.on_grid(of_face).heights, start=1):
                     arrays[f"surfaces/{name}/body_{body}"] = height
                 arrays |= {f"contact/{name}/{k}": field for k, field in vars(fields).items()}
-            arrays |= loops | stored_tensions(self.source, states)
+            arrays |= loops | stored_tensions(self.source, faces)
             self.steps.record(state.jump, arrays, {"cycles": float(state.cycles[-1])})
 
     def _loops(self, state: CoupledState[Any]) -> dict[str, Array]:
@@ -124,5 +123,5 @@ class FileRecorder(Observer):
         if loops is None or not loops.due(state.jump, self.settings.ended(state)):
             return {}
         with self.run.reporter.stage("tangential loops"):
-            found = self.contacts.loops(self.contacts.states(state), self.peak, loops)
-        return stored_loops(self.contacts.names, found)
+            found = self.contacts.loops(state, self.peak, loops)
+        return stored_loops([stage.name for stage in self.contacts.stages], found)

@@ -158,12 +158,11 @@ def _march(
     recorder = FileRecorder(run, settings, source.peak, contacts, source, steps)
     loop = model.loop(source, contacts, (RunLog(run, contacts, source), recorder))
     state, first = loop.begin(unworn)
-    states = contacts.states(state)
-    warn_of_contact(case, source, contacts.stages, states, first, reporter)
+    warn_of_contact(case, source, contacts.faces(state), first, reporter)
     with reporter.course("wear"):
         end = loop.run(state, steps)
     steps.save()
-    warn_of_worn_cells(case, source.peak, contacts.stages, contacts.states(end), reporter)
+    warn_of_worn_cells(case, source.peak, contacts.faces(end), reporter)
     return end, first
 
 

@@ -43,7 +43,7 @@ def of_file(folder: Path, energy: float):
 def warnings_of(folder, case, source, stage, state, first) -> list[str]:
     """Return the warnings about energies."""
     reporter = Reporter(folder / "log")
-    warn_of_contact(case, source, [stage], [state], [first], reporter)
+    warn_of_contact(case, source, [(stage, state)], [first], reporter)
     return [line for line in reporter.warnings if "dissipate" in line]
 
 

@@ -8,7 +8,6 @@ middle. Pressure and slip are the structure's, wear is the half-space's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,7 @@ from sa_solver.cycles.increments import friction_work
 from sa_solver.types import Array
 from workflow.case.text.plain import shares
 from workflow.case.text.readable import percent
-from workflow.models.contact import FaceContact, FaceState
+from workflow.models.contact import FaceContact, FaceState, WornFaces
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 
@@ -109,15 +108,13 @@ class Uniformity:
         )
 
 
-def uniformities(
-    source: LoadSource, stages: Sequence[FaceContact], states: Sequence[FaceState]
-) -> dict[str, Uniformity]:
+def uniformities(source: LoadSource, faces: WornFaces) -> dict[str, Uniformity]:
     """Return the uniformity of every loaded contact of a 3D structure, by interface."""
     if not isinstance(source, StructureLoads) or source.line:
         return {}
     return {
         stage.name: result
-        for stage, history, state in zip(stages, source.unworn(), states, strict=True)
+        for (stage, state), history in zip(faces, source.unworn(), strict=True)
         if (result := uniformity(stage, history, state, source.peak)) is not None
     }
 

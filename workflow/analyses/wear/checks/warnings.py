@@ -19,7 +19,7 @@ from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
-from workflow.models.contact import FaceContact, FaceState, border_warnings
+from workflow.models.contact import FaceContact, WornFaces, border_warnings
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 from workflow.shell.few_cells import check_cells
@@ -137,8 +137,7 @@ def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:
 def warn_of_contact(
     case: WearCase,
     source: LoadSource,
-    stages: Sequence[FaceContact],
-    states: Sequence[FaceState],
+    faces: WornFaces,
     first: Sequence[FirstContact],
     reporter: Reporter,
 ) -> None:
@@ -146,6 +145,7 @@ def warn_of_contact(
 
     Raises UserError if a contact has too few cells.
     """
+    stages = [stage for stage, _ in faces]
     unlike = [stage.pair for stage in stages if not stage.pair.similar]
     if case.contact.method == "normal" and unlike:
         pair = max(unlike, key=lambda pair: abs(pair.dundurs_beta))
@@ -157,7 +157,7 @@ def warn_of_contact(
         )
     for line in border_warnings(stages, first):
         reporter.warn(line)
-    for stage, state, result in zip(stages, states, first, strict=True):
+    for (stage, state), result in zip(faces, first, strict=True):
         terms = case.terms(stage.name)
         yield_stress = min(material.yield_stress for material in terms.materials)
         if case.contact.method != "nodes":
@@ -217,15 +217,9 @@ def _work_of_sliding(stage: FaceContact, loads: LoadHistory) -> float:
     return float(shear**2 / (modulus * width))
 
 
-def warn_of_instability(
-    stages: Sequence[FaceContact],
-    states: Sequence[FaceState],
-    cycles: float,
-    reporter: Reporter,
-) -> None:
+def warn_of_instability(faces: WornFaces, cycles: float, reporter: Reporter) -> None:
     """Warn of explicit steps with more cycles than is stable."""
-    pairs = zip(stages, states, strict=True)
-    stable = min(stage.contact.stable_cycles(state) for stage, state in pairs)
+    stable = min(stage.contact.stable_cycles(state) for stage, state in faces)
     if cycles > stable:
         reporter.warn(
             f"explicit wear steps above {stable:.3g} cycles amplify the roughness of the grid: "
@@ -233,11 +227,9 @@ def warn_of_instability(
         )
 
 
-def warn_of_growth(
-    stages: Sequence[FaceContact], states: Sequence[FaceState], reporter: Reporter
-) -> None:
+def warn_of_growth(faces: WornFaces, reporter: Reporter) -> None:
     """Warn of half-space contacts that have worn up to the border of their grid."""
-    for stage, state in zip(stages, states, strict=True):
+    for stage, state in faces:
         worn = state.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
             reporter.warn(stage.border_warning)
@@ -256,15 +248,9 @@ def warn_of_many_jumps(
     )
 
 
-def warn_of_worn_cells(
-    case: WearCase,
-    peak: int,
-    stages: Sequence[FaceContact],
-    states: Sequence[FaceState],
-    reporter: Reporter,
-) -> None:
+def warn_of_worn_cells(case: WearCase, peak: int, faces: WornFaces, reporter: Reporter) -> None:
     """Warn of worn contacts that carry the peak load on few cells."""
-    for stage, state in zip(stages, states, strict=True):
+    for stage, state in faces:
         if peak in state.starts:
             pressure = state.starts[peak].pressure
             settings = case.contact_of(stage.name)
