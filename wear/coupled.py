@@ -20,9 +20,9 @@ import numpy as np
 
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array, resultant_change
-from wear.contact.contacts import KINETICS, Contacts, WearingContacts
+from wear.contact.contacts import Contacts, LoadedContacts, WearingContacts
 from wear.contact.face_loads import FaceLoads
-from wear.contact.interface import FirstContact, InterfaceState
+from wear.contact.interface import FirstContact
 from wear.coupled_state import CoupledState, Observer, Worn, observed
 from wear.load_sources import CycleSource
 from wear.schedule import CoupledSettings, Schedule
@@ -55,6 +55,7 @@ class CoupledWear(Generic[Worn]):
         Source of the loads of :class:`Contacts`; None for a contact with its own.
     contacts
         The wearing contacts: :class:`Contacts`, or a :class:`wear.contact.contacts.SoleContact`.
+        Those under the loads of a ``source`` are :class:`wear.contact.contacts.LoadedContacts`.
     observers
         Objects that follow the run.
 
@@ -93,31 +94,27 @@ class CoupledWear(Generic[Worn]):
     contacts: WearingContacts[Worn]
     observers: Sequence[Observer] = ()
 
-    def begin(
-        self: CoupledWear[InterfaceState], unworn: Sequence[FaceLoads]
-    ) -> tuple[CoupledState, list[FirstContact]]:
+    def begin(self, unworn: Sequence[FaceLoads]) -> tuple[CoupledState[Worn], list[FirstContact]]:
         """Return the state before the first jump, and the contact of the first cycle.
 
         ``unworn`` are the loads of all contacts before any wear.
         """
         assert isinstance(self.settings, CoupledSettings)
         with self._stage("contact, first cycle"):
-            begun = self._faces.begin(unworn, self.settings.cycles)
-        cost = sum((first.cost for _, first in begun), Cost())
-        return self.unworn([state for state, _ in begun], cost), [first for _, first in begun]
+            states, firsts = self._loaded.begin(unworn, self.settings.cycles)
+        return self.unworn(states, sum((first.cost for first in firsts), Cost())), firsts
 
     def unworn(self, interfaces: Sequence[Worn], cost: Cost = NOTHING) -> CoupledState[Worn]:
         """Return the state before the first jump, from those of the contacts and their cost."""
-        state = CoupledState(
+        return CoupledState(
             interfaces=tuple(interfaces),
-            cycles=np.empty(0),
-            kinetics=np.empty((0, len(interfaces), len(KINETICS))),
-            drift=np.empty(0),
+            cycles=np.zeros(1),
+            kinetics=self.contacts.kinetics(interfaces)[None],
+            drift=np.zeros(1),
             solved_resultants=self._probe(interfaces),
             solutions=1,
             cost=cost,
         )
-        return state.record(0.0, self.contacts, 0.0)
 
     def march(self, state: CoupledState[Worn]) -> Iterator[CoupledState[Worn]]:
         """Yield the state after every jump from ``state``, until the run ends or reaches a stop."""
@@ -197,15 +194,16 @@ class CoupledWear(Generic[Worn]):
 
     # -- loads -------------------------------------------------------------------------------------
     @property
-    def _faces(self) -> Contacts:
+    def _loaded(self) -> LoadedContacts[Worn]:
         """The contacts under the loads of the source."""
-        return cast("Contacts", self.contacts)
+        return cast("LoadedContacts[Worn]", self.contacts)
 
     def _follow_drift(self, state: CoupledState[Any]) -> tuple[CoupledState[Any], float]:
         """Solve the loads again if their resultants have drifted too far, and return the drift."""
-        settings, contacts, source = self.settings, self._faces, self.source
+        settings, source = self.settings, self.source
         if source is None or settings.resultants == "constant":
             return state, 0.0
+        contacts = cast("Contacts", self.contacts)
         with self._stage("drift probe"):
             probe = self._probe(state.interfaces)
         sizes = np.array([contact.grid.size for contact in contacts.contacts])
@@ -229,12 +227,12 @@ class CoupledWear(Generic[Worn]):
     def _probe(self, interfaces: Sequence[Any]) -> Array:
         if self.source is None:
             return np.empty((0, 6))
-        return self.source.probe(self._faces.nodal_depths(interfaces), self._friction(interfaces))
+        return self.source.probe(self._loaded.nodal_depths(interfaces), self._friction(interfaces))
 
     def _friction(self, interfaces: Sequence[Any]) -> list[float] | None:
         """Return the coefficients of friction of the interfaces, or None if they are constant."""
         constant = self.settings.friction == "constant"
-        return None if constant else self._faces.friction(interfaces)
+        return None if constant else cast("Contacts", self.contacts).friction(interfaces)
 
 
 def _in_phase(interfaces: Sequence[Worn], cycles: float) -> Sequence[Worn]:

@@ -105,12 +105,12 @@ def test_a_held_approach_wears_until_nothing_is_pressed() -> None:
     contact = interface(SPHERE, drive)
     history = CycleLoads(loads_of(P=[1.0, 1.0]), slip)
     state, first = contact.begin(history, 1e9)
-    carried = [contact.carried(history.loads, first.pressure).P[0]]
+    carried = [drive.carried(BALL, history.loads, first.pressure).P[0]]
     for jump in range(12):
         cycles = 3.0 ** (jump + 1)
         state, _ = contact.jump(state, cycles, cycles)
         pressure = np.stack([start.pressure for start in state.starts.values()])
-        carried.append(contact.carried(state.loads, pressure).P[0])
+        carried.append(drive.carried(BALL, state.loads, pressure).P[0])
     np.testing.assert_allclose(state.surfaces.depth, np.maximum(approach - SPHERE, 0.0), atol=2e-6)
     assert np.all(np.diff(carried) < 0.0)
     assert carried[-1] < 2e-3 * carried[0]

@@ -22,7 +22,7 @@ from wear.worn import Cost, State, WornState
 KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
 """Columns of the kinetics of one interface, in mm, mm³ and N mm."""
 
-Same = TypeVar("Same")
+Answer = TypeVar("Answer")
 Solution = TypeVar("Solution")
 
 
@@ -90,40 +90,65 @@ class SoleContact(Generic[State, Contact]):
 
     def kinetics(self, states: Sequence[State]) -> Array:
         (state,) = states
-        return np.array([_kinetics(state, lambda depth: float(np.sum(depth * self.areas)))])
+        return np.array([kinetics_of(state, lambda depth: float(np.sum(depth * self.areas)))])
 
 
-class Contacts:
-    """The contacts of all interfaces, which wear one after the other in this process.
-
-    :class:`wear.contact.interface.InterfaceContact` documents the methods, which are called here
-    for every contact. A subclass that overrides :meth:`call` may run the contacts in parallel.
-    """
-
-    def __init__(self, contacts: Sequence[InterfaceContact]) -> None:
-        self.contacts = contacts
-
-    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
-        """Call a method of every contact, each with its own share of the ``arguments``."""
-        answers = []
-        for contact, *shares in zip(self.contacts, *arguments, strict=True):
-            with failures_of(contact.name):
-                answers.append(getattr(contact, method)(*shares))
-        return answers
-
-    def each(self, same: Same) -> list[Same]:
-        """Return a list with the same value for every contact."""
-        return [same] * len(self.contacts)
+class LoadedContacts(WearingContacts[State], Protocol):
+    """Protocol of wearing contacts under the loads of a source, which has loads for each face."""
 
     def begin(
         self, histories: Sequence[FaceLoads], cycles: float
-    ) -> list[tuple[InterfaceState, FirstContact]]:
-        return self.call("begin", histories, self.each(cycles))
+    ) -> tuple[Sequence[State], list[FirstContact]]:
+        """Return the unworn states of a run of ``cycles``, and the first cycle of every face."""
+        ...
+
+    def nodal_depths(self, states: Sequence[State]) -> list[Array]:
+        """Return the worn depth of both bodies at the nodes ``(n,)`` of every face [mm]."""
+        ...
+
+
+class Call(Protocol):
+    """Protocol of a call of one function for every contact, here or in other processes.
+
+    The ``function`` takes a contact and its share of the ``shares``.
+    """
+
+    def __call__(
+        self, function: Callable[[Any, Any], Answer], shares: Sequence[Any]
+    ) -> list[Answer]: ...
+
+
+def call_in_turn(
+    contacts: Sequence[Any], function: Callable[[Any, Any], Answer], shares: Sequence[Any]
+) -> list[Answer]:
+    """Call a function for every one of the ``contacts``, one after the other."""
+    answers = []
+    for contact, share in zip(contacts, shares, strict=True):
+        with failures_of(contact.name):
+            answers.append(function(contact, share))
+    return answers
+
+
+class Contacts:
+    """The contacts of all interfaces, each of which wears by itself.
+
+    :class:`wear.contact.interface.InterfaceContact` documents the methods, which are called here
+    for every contact: one after the other, unless ``call`` calls them in another way.
+    """
+
+    def __init__(self, contacts: Sequence[InterfaceContact], call: Call | None = None) -> None:
+        self.contacts, self._call = contacts, call or partial(call_in_turn, contacts)
+
+    def begin(
+        self, histories: Sequence[FaceLoads], cycles: float
+    ) -> tuple[list[InterfaceState], list[FirstContact]]:
+        begun = self._call(partial(InterfaceContact.begin, cycles=cycles), histories)
+        return [state for state, _ in begun], [first for _, first in begun]
 
     def jump(
         self, states: Sequence[InterfaceState], cycles: float, left: float
     ) -> list[tuple[InterfaceState, Cost]]:
-        return self.call("jump", states, self.each(cycles), self.each(left))
+        return self._call(partial(InterfaceContact.jump, cycles=cycles, left=left), states)
 
     def follow(
         self, states: Sequence[InterfaceState], histories: Sequence[FaceLoads]
@@ -141,13 +166,14 @@ class Contacts:
     def kinetics(self, states: Sequence[InterfaceState]) -> Array:
         """Return a row of :data:`KINETICS` for every interface ``(interfaces, 5)``."""
         pairs = zip(self.contacts, states, strict=True)
-        return np.array([_kinetics(state, contact.volume) for contact, state in pairs])
+        return np.array([kinetics_of(state, contact.volume) for contact, state in pairs])
 
     def nodal_depths(self, states: Sequence[InterfaceState]) -> list[Array]:
-        return [c.nodal_depth(state) for c, state in zip(self.contacts, states, strict=True)]
+        pairs = zip(self.contacts, states, strict=True)
+        return [contact.at_nodes(state.surfaces.depth) for contact, state in pairs]
 
 
-def _kinetics(state: WornState, volume: Callable[[Array], float]) -> list[float]:
+def kinetics_of(state: WornState, volume: Callable[[Array], float]) -> list[float]:
     """Return the columns of :data:`KINETICS` of a contact."""
     depths = state.surfaces.depths
     return [*(float(depth.max()) for depth in depths), *map(volume, depths), state.energy]

@@ -7,7 +7,7 @@ first met. The contact then determines the forces.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from sa_solver.contact_state import ContactLoad
 from sa_solver.cycles.history import ContactLoadPath
 from sa_solver.rigid_modes import NORMAL
-from sa_solver.types import Array, LoadHistory, Tilt
+from sa_solver.types import Array, Grid, LoadHistory, Tilt
 
 FORCES = (False,) * 6
 TILTS = NORMAL[1:]
@@ -73,6 +73,20 @@ class Drive:
             (motions if self.motion[k] else forces)[place]: float(values[k])
             for place, k in enumerate(NORMAL)
         }
+
+    def carried(self, grid: Grid, loads: LoadHistory, pressure: Array) -> LoadHistory:
+        """Return ``loads`` with the resultants of a pressure where normal motions are imposed.
+
+        ``pressure`` ``(t, nx, ny)`` [MPa] is that on the cells of ``grid``.
+        """
+        arms = {"P": np.ones(1), "Mx": grid.y, "My": -grid.x}
+        imposed = zip(arms.items(), NORMAL, strict=True)
+        driven = {name: arm for (name, arm), k in imposed if self.motion[k]}
+        if not driven:
+            return loads
+        force = pressure * grid.cell_area
+        found = {name: np.sum(force * arm, axis=(1, 2)) for name, arm in driven.items()}
+        return replace(loads, **found)
 
     def increments(self, loads: LoadHistory) -> list[ContactLoad]:
         """Return the imposed load of each increment, with the friction energies of the loads."""

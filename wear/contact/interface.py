@@ -19,7 +19,6 @@ from sa_solver.contact_state import ContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
-from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, LoadHistory, Mask
 from wear.contact.face_loads import FaceLoads
@@ -38,7 +37,6 @@ from wear.steps.stepping import (
     WearingContact,
     WearState,
 )
-from wear.surfaces import Surfaces
 from wear.worn import Cost
 
 
@@ -256,18 +254,22 @@ class InterfaceContact:
         """Return the longest stable explicit step [cycles]."""
         return self._loaded(state).contact.stable_cycles(state)
 
-    def on_grid(self, state: InterfaceState) -> Surfaces:
-        """Return the surfaces of a state on the cells of the grid."""
-        return state.surfaces
-
     @property
-    def areas(self) -> Array | float:
-        """Area of each cell, or of each node ``(n,)``, of the worn surfaces [mm²]."""
+    def areas(self) -> float:
+        """Area of a cell of the worn surfaces [mm²]."""
         return self.grid.cell_area
 
     def volume(self, depth: Array) -> float:
-        """Return the volume of a worn ``depth`` [mm³], by cell or node as the surfaces are."""
+        """Return the volume of a worn ``depth`` ``(nx, ny)`` [mm³]."""
         return float(depth.sum()) * self.grid.cell_area
+
+    def on_cells(self, field: Array) -> Array:
+        """Return a field of the worn surfaces on the cells of the grid: the field itself."""
+        return field
+
+    def at_nodes(self, field: Array) -> Array:
+        """Return a field of the worn surfaces ``(nx, ny)`` at the nodes of the face ``(n,)``."""
+        return self.transfer.to_nodes(field)
 
     def moved(self, state: InterfaceState) -> float:
         """Return the share of the load that wear has moved since the loads were last solved.
@@ -278,10 +280,6 @@ class InterfaceContact:
             return 0.0
         now = self._shared_out(state.starts, state.loads)
         return 0.5 * float(np.abs(now - state.pressed).sum())
-
-    def nodal_depth(self, state: InterfaceState) -> Array:
-        """Return the worn depth of both bodies together at the nodes of the face ``(n,)`` [mm]."""
-        return self.transfer.to_nodes(state.surfaces.depth)
 
     # -- tractions ---------------------------------------------------------------------------------
     def fields(self, state: InterfaceState, increment: int) -> ContactFields:
@@ -312,20 +310,6 @@ class InterfaceContact:
         if cycle:
             return self._half_space_tractions(history.loads, cycle, 0.0)
         return self._given_tractions(history, pressure, 0.0)
-
-    def carried(self, loads: LoadHistory, pressure: Array) -> LoadHistory:
-        """Return ``loads`` with the resultants of ``pressure`` where normal motions are imposed.
-
-        ``pressure`` is ``(t, nx, ny)`` [MPa].
-        """
-        force, grid = pressure * self.grid.cell_area, self.grid
-        arms = {"P": np.ones(1), "Mx": grid.y, "My": -grid.x}
-        imposed = zip(arms.items(), NORMAL, strict=True)
-        driven = {name: arm for (name, arm), k in imposed if self.settings.drive.motion[k]}
-        if not driven:
-            return loads
-        found = {name: np.sum(force * arm, axis=(1, 2)) for name, arm in driven.items()}
-        return replace(loads, **found)
 
     def frictional(self, energy: float) -> FrictionalContact:
         """Return the half-space contact with friction after ``energy`` [N mm] is dissipated."""

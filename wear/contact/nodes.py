@@ -8,13 +8,16 @@ laws are those of :mod:`wear.laws`, with nodes instead of cells.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, LoadHistory
+from wear.contact.face_loads import FaceLoads
 from wear.laws import SlidingConditions, WearLaw
+from wear.steps.stepping import Starts
 from wear.worn import Cost, WearStep, WornState
 
 
@@ -51,6 +54,24 @@ class NodalState(WornState):
     """State of wearing nodes; ``start`` is the solver's starting point from the last cycle."""
 
     start: object = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodalFaceState(WornState):
+    """State of the nodes of one face: a view of the :class:`NodalState` of all faces.
+
+    ``cycle`` returns the loads of the face on these surfaces. The contact has no starting points of
+    a half-space, and its motion is not followed.
+    """
+
+    cycle: Callable[[], FaceLoads]
+    starts: ClassVar[Starts] = {}
+    paths: ClassVar[Array] = np.empty((0, 3, 2))
+
+    @property
+    def loads(self) -> LoadHistory:
+        """Resultants of the face on the present surfaces."""
+        return self.cycle().loads
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,8 @@ if TYPE_CHECKING:
     from wear.fitting.estimates import Estimate
     from wear.fitting.evolutions import EvolutionData, evolution_problem
     from wear.fitting.least_squares import Fit, fit
-    from wear.fitting.loops import LoopData, loop_data, loop_problem
+    from wear.fitting.loop_samples import LoopData, loop_data
+    from wear.fitting.loops import loop_problem
     from wear.fitting.problem import FitError, FitProblem, FreeParameter, Series
     from wear.fitting.scars import ComputedScars, ScarData, scar_problem
     from wear.fitting.volumes import VolumeData, VolumeLaw, volume_problem

@@ -9,7 +9,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.fitting import FitError, LoopData, fit, loop_data, loop_problem
-from wear.fitting.loops import MOST_LOOPS
+from wear.fitting.loop_samples import MOST_LOOPS
 from wear.joints.measured.loop_record import MeasuredLoopError
 from wear.joints.measured.measured_loops import ALIKE, MeasuredLoops, measure_loops
 from workflow.case.files.loop_file import account, read_loop_file

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol
 
 import numpy as np
 
-from fe_models.meshes.structure_mesh import Face
 from fe_models.meshes.transfer import FaceTransfer
 from sa_solver import checks
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.contact.interface import InterfaceContact, InterfaceState
+from wear.contact.face_loads import FaceLoads
+from wear.contact.interface import FirstContact, InterfaceState
 from wear.contact.link import StructureLink
+from wear.contact.nodes import NodalFaceState
 from wear.contact.settings import InterfaceSettings
-from wear.contact.tractions import CycleTractions
+from wear.contact.tractions import ContactFields, CycleTractions
 from wear.evolution import CoulombFriction
 from wear.laws import WearLaw
 from wear.schedule import CoupledSettings, JumpSize, Stop
@@ -25,8 +26,8 @@ from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
 from wear.steps.step_errors import ErrorControl, step_errors
 from wear.steps.steppers import ExplicitStepper, Stepper
 from wear.steps.stepping import WearingContact, WearState
+from wear.surfaces import Surfaces
 from workflow.models.loads import ContactFace
-from workflow.models.loops import TangentialLoops, WornLoop, worn_loop
 
 WearStepper = Stepper[WearState, WearingContact]
 
@@ -191,19 +192,50 @@ class Wear:
 # --- one face -------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class ContactEnd:
-    """A cycle on the surfaces at the end of a run.
-
-    ``pressure_of_coarse_run`` ``(t, nx, ny)`` [MPa] is the pressure on the surfaces of the run with
-    steps of twice the length; None if no such steps were taken.
-    """
-
-    tractions: CycleTractions
-    pressure_of_coarse_run: Array | None
+FaceState = InterfaceState | NodalFaceState
+"""State of one contact face, whose surfaces are given by cell or by node."""
 
 
-class FaceContact(InterfaceContact):
+class FaceSolution(Protocol):
+    """Protocol of what solves the cycles of one face on worn surfaces, given by cell or by node."""
+
+    @property
+    def areas(self) -> Array | float:
+        """Area of each cell, or of each node ``(n,)``, of the worn surfaces [mm²]."""
+        ...
+
+    def on_cells(self, field: Array) -> Array:
+        """Return a field of the worn surfaces on the cells of the grid ``(nx, ny)``."""
+        ...
+
+    def at_nodes(self, field: Array) -> Array:
+        """Return a field of the worn surfaces at the nodes of the face ``(n,)``."""
+        ...
+
+    def fields(self, state: Any, increment: int) -> ContactFields:
+        """Return tractions and slip of an increment on the present surfaces."""
+        ...
+
+    def tractions(self, state: Any) -> CycleTractions:
+        """Return the tractions of a cycle on the present surfaces."""
+        ...
+
+    def unworn_tractions(self, history: FaceLoads, first: FirstContact) -> CycleTractions:
+        """Return the tractions of the first cycle, which is solved already."""
+        ...
+
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    Solution = TypeVar("Solution", bound=FaceSolution, default=Any)
+else:
+    from typing import TypeVar
+
+    Solution = TypeVar("Solution", bound=FaceSolution)
+
+
+class FaceContact(Generic[Solution]):
     """One contact face on its grid.
 
     Parameters
@@ -214,37 +246,42 @@ class FaceContact(InterfaceContact):
         Materials, laws and settings of the contact.
     wear : Wear
         Wear settings.
+    solution : callable
+        Returns what solves the cycles of the face, from its settings: a class such as
+        :class:`wear.contact.interface.InterfaceContact`. Attribute ``contact`` has it.
     stepper : Stepper, optional
         Stepper to use instead of that of ``wear``.
     """
 
-    transfer: FaceTransfer
-
     def __init__(
-        self, face: ContactFace, contact: Contact, wear: Wear, stepper: WearStepper | None = None
+        self,
+        face: ContactFace,
+        contact: Contact,
+        wear: Wear,
+        solution: Callable[[InterfaceSettings], Solution],
+        stepper: WearStepper | None = None,
     ) -> None:
-        grid = face.grid(contact.grid)
-        self._contact_face, self.face = face, face.face
-        self.remedy, self.coarse_grid = face.remedy, face.grid(face.coarse)
-        transfer = FaceTransfer.between(face.face, grid)
-        super().__init__(
-            InterfaceSettings(
-                name=face.face.name,
-                grid=grid,
-                gap=gap_on(face, grid),
-                transfer=transfer,
-                pair=ElasticPair(*contact.bodies),
-                laws=contact.laws,
-                friction=contact.coulomb.at,
-                stepper=stepper or wear.stepper(),
-                method="full" if contact.method == "full" else "normal",
-                gross_slip=contact.gross_slip,
-                drive=face.drive,
-                follow=_follow(contact, wear),
-                link=contact.link,
-                tolerance=contact.tolerance,
-            )
+        self._contact_face, self.face, self.name = face, face.face, face.face.name
+        self.grid, self.coarse_grid = face.grid(contact.grid), face.grid(face.coarse)
+        self.transfer = FaceTransfer.between(face.face, self.grid)
+        self.pair = ElasticPair(*contact.bodies)
+        self.settings = InterfaceSettings(
+            name=self.name,
+            grid=self.grid,
+            gap=gap_on(face, self.grid),
+            transfer=self.transfer,
+            pair=self.pair,
+            laws=contact.laws,
+            friction=contact.coulomb.at,
+            stepper=stepper or wear.stepper(),
+            method="full" if contact.method == "full" else "normal",
+            gross_slip=contact.gross_slip,
+            drive=face.drive,
+            follow=_follow(contact, wear),
+            link=contact.link,
+            tolerance=contact.tolerance,
         )
+        self.contact = solution(self.settings)
 
     def coarse_pressure(self, loads: LoadHistory, link: StructureLink, peak: int) -> Array:
         """Return the unworn peak pressure [MPa] on a grid as coarse as the structure's mesh."""
@@ -259,45 +296,57 @@ class FaceContact(InterfaceContact):
         """Warning for a contact that is cut off by the border of its grid."""
         return (
             f"{self.name}: the contact touches the border of its grid, where it is cut off: "
-            f"{self.remedy}"
+            f"{self._contact_face.remedy}"
         )
-
-    def face_of(self, body: Literal[1, 2]) -> Face:
-        """Return the face of one body, with the nodes of that body."""
-        return self.face.face(body)
 
     def transfer_of(self, body: Literal[1, 2]) -> FaceTransfer:
         """Return the transfer between the face of one body and the grid."""
-        face = self.face_of(body)
+        face = self.face.face(body)
         return self.transfer if face is self.face else FaceTransfer.between(face, self.grid)
 
-    def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
+    def on_grid(self, state: FaceState) -> Surfaces:
+        """Return the surfaces of a state on the cells of the grid."""
+        worn = state.surfaces
+        fields = (worn.depth_1, worn.depth_2, worn.work_1, worn.work_2)
+        return Surfaces(self.settings.gap, *map(self.contact.on_cells, fields))
+
+    def depths_of_bodies(self, state: FaceState) -> tuple[Array, Array]:
         """Return the worn depths of both bodies at their own nodes [mm]; volumes are preserved."""
-        surfaces = state.surfaces
-        to_1 = self.transfer_of(1)
-        return to_1.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
+        depth_1, depth_2 = map(self.contact.at_nodes, state.surfaces.depths)
+        if (to_1 := self.transfer_of(1)) is not self.transfer:
+            depth_1 = to_1.to_nodes(self.contact.on_cells(state.surfaces.depth_1))
+        return depth_1, depth_2
 
-    def seen(self, state: InterfaceState, increment: int) -> InterfaceState:
-        """Return the part of a state that :meth:`fields` needs for an increment.
 
-        Where slips are given it is about a tenth of the state, and faster to send to a process.
-        """
-        if self.settings.method == "full":
-            return state
-        starts = {t: start for t, start in state.starts.items() if t == increment}
-        return replace(state, starts=starts, coarse=None)
+WornFaces = Sequence[tuple[FaceContact, FaceState]]
+"""All contact faces, each with its state."""
 
-    def end(self, state: InterfaceState) -> ContactEnd:
-        """Return the cycle on the surfaces at the end of a run."""
-        coarse_run, pressure = state.coarse, None
-        if step_errors(state, self.areas) is not None and isinstance(coarse_run, InterfaceState):
-            pressure = self.tractions(coarse_run).pressure
-        return ContactEnd(self.tractions(state), pressure)
 
-    def loop(self, state: InterfaceState, peak: int, loops: TangentialLoops) -> WornLoop:
-        """Return a tangential loop on the present surfaces, under the loads at ``peak``."""
-        contact, lift = self.frictional(state.energy), state.link.lift(peak, self.transfer.places)
-        return worn_loop(contact, loops, self.name, state, peak, self.settings.drive.tilt, lift)
+def border_warnings(stages: Sequence[FaceContact], first: Sequence[FirstContact]) -> Iterator[str]:
+    """Yield the warnings for contacts that touch the border of their grid in the first cycle."""
+    for stage, found in zip(stages, first, strict=True):
+        if found.touches_border:
+            yield stage.border_warning
+
+
+@dataclass(frozen=True)
+class ContactEnd:
+    """A cycle on the surfaces at the end of a run.
+
+    ``pressure_of_coarse_run`` ``(t, nx, ny)`` [MPa] is the pressure on the surfaces of the run with
+    steps of twice the length; None if no such steps were taken.
+    """
+
+    tractions: CycleTractions
+    pressure_of_coarse_run: Array | None
+
+
+def last_cycle(contact: FaceSolution, state: FaceState) -> ContactEnd:
+    """Return the cycle of a contact on the surfaces at the end of a run."""
+    pressure = None
+    if step_errors(state, contact.areas) is not None:
+        pressure = contact.tractions(state.coarse).pressure
+    return ContactEnd(contact.tractions(state), pressure)
 
 
 def gap_on(face: ContactFace, grid: Grid) -> Array:

@@ -1,47 +1,87 @@
-"""All contacts of a model, as the coupled loop calls them."""
+"""All contacts of a model: what the coupled loop wears, and its states face by face."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
-from wear.contact.contacts import Contacts
-from wear.contact.interface import InterfaceState
+from wear.contact.contacts import Call, Contacts, LoadedContacts, call_in_turn
+from wear.contact.interface import InterfaceContact, InterfaceState
 from wear.contact.tractions import ContactFields
-from workflow.models.contact import ContactEnd, FaceContact
-from workflow.models.loops import TangentialLoops, WornLoop
-from workflow.models.progress import ReportsProgress
+from wear.coupled_state import CoupledState
+from workflow.models.contact import FaceContact, FaceSolution, FaceState, WornFaces
+from workflow.models.loops import TangentialLoops, WornLoop, worn_loop
 
 
-class FaceContacts(ReportsProgress, Contacts):
-    """The contacts of all faces of a model, which wear one after the other in this process.
+@dataclass(frozen=True)
+class FaceContacts:
+    """The contacts of all faces of a model.
 
-    ``stages`` are the contacts, in the order of the faces.
+    Parameters
+    ----------
+    stages
+        The contacts, in the order of the faces.
+    wearing
+        What wears them in the coupled loop.
+    call
+        Call of a function for what solves each contact.
+    views
+        Returns the state of every face from those of the loop.
     """
 
-    def __init__(self, stages: Sequence[FaceContact]) -> None:
-        super().__init__(stages)
-        self.stages = list(stages)
+    stages: Sequence[FaceContact]
+    wearing: LoadedContacts[Any]
+    call: Call
+    views: Callable[[Sequence[Any]], Sequence[FaceState]] = list
 
-    @property
-    def names(self) -> list[str]:
-        return [stage.name for stage in self.stages]
+    @classmethod
+    def half_spaces(
+        cls, stages: Sequence[FaceContact[InterfaceContact]], call: Call | None = None
+    ) -> FaceContacts:
+        """Return half-space contacts, called one after the other in this process by default."""
+        contacts = [stage.contact for stage in stages]
+        call = call or partial(call_in_turn, contacts)
+        return cls(stages, Contacts(contacts, call), call)
 
-    def fields(self, states: Sequence[InterfaceState], increment: int) -> list[ContactFields]:
+    def states(self, state: CoupledState[Any]) -> Sequence[FaceState]:
+        """Return the state of every face."""
+        return self.views(state.interfaces)
+
+    def faces(self, state: CoupledState[Any]) -> WornFaces:
+        """Return every face with its state."""
+        return list(zip(self.stages, self.states(state), strict=True))
+
+    def fields(self, state: CoupledState[Any], increment: int) -> list[ContactFields]:
         """Return tractions and slip of an increment on the present surfaces."""
-        pairs = zip(self.stages, states, strict=True)
-        seen = [stage.seen(state, increment) for stage, state in pairs]
-        return self.call("fields", seen, self.each(increment))
+        seen = [_seen(stage, of_face, increment) for stage, of_face in self.faces(state)]
+        return self.call(partial(_fields, increment=increment), seen)
 
-    def loops(
-        self, states: Sequence[InterfaceState], increment: int, loops: TangentialLoops
-    ) -> list[WornLoop]:
-        """Return tangential loops on the present surfaces, under the loads of an increment."""
-        return self.call("loop", states, self.each(increment), self.each(loops))
+    def loops(self, state: CoupledState[Any], peak: int, loops: TangentialLoops) -> list[WornLoop]:
+        """Return tangential loops of half-spaces on the present surfaces, at the ``peak`` load."""
+        return self.call(partial(_loop, peak=peak, loops=loops), self.states(state))
 
-    def ends(self, states: Sequence[InterfaceState]) -> Callable[[], list[ContactEnd]]:
-        """Return a function that gives the cycles on the surfaces at the end.
 
-        They may be found in other processes meanwhile.
-        """
-        return partial(self.call, "end", states)
+def _seen(stage: FaceContact, state: FaceState, increment: int) -> FaceState:
+    """Return the part of a state that tells the fields of an increment.
+
+    Where slips are given it is about a tenth of the state, and faster to send to a process.
+    """
+    if stage.settings.method == "full" or not isinstance(state, InterfaceState):
+        return state
+    starts = {t: start for t, start in state.starts.items() if t == increment}
+    return replace(state, starts=starts, coarse=None)
+
+
+def _fields(contact: FaceSolution, state: FaceState, increment: int) -> ContactFields:
+    return contact.fields(state, increment)
+
+
+def _loop(
+    contact: InterfaceContact, state: InterfaceState, peak: int, loops: TangentialLoops
+) -> WornLoop:
+    lift = state.link.lift(peak, contact.transfer.places)
+    tilt = contact.settings.drive.tilt
+    frictional = contact.frictional(state.energy)
+    return worn_loop(frictional, loops, contact.name, state, peak, tilt, lift)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from wear.coupled_state import CoupledState, Observer
 from wear.steps.step_errors import step_errors
 from wear.surfaces import Surfaces
 from workflow.layout.declared import GRID, Declared, declared
+from workflow.models.contact import FaceContact, FaceState
 from workflow.models.contacts import FaceContacts
 
 if TYPE_CHECKING:
@@ -58,17 +59,17 @@ class ResultsRecorder(Observer):
     surfaces: list[list[Surfaces]] = field(default_factory=list)
     fields: list[list[ContactFields]] = field(default_factory=list)
 
-    def begin(self, state: CoupledState) -> None:
+    def begin(self, state: CoupledState[Any]) -> None:
         self._record(state)
 
-    def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
+    def jump_finished(self, before: CoupledState[Any], after: CoupledState[Any]) -> None:
         self._record(after)
 
-    def _record(self, state: CoupledState) -> None:
-        pairs = zip(self.contacts.stages, state.interfaces, strict=True)
+    def _record(self, state: CoupledState[Any]) -> None:
+        faces = self.contacts.faces(state)
         self.cycles.append(float(state.cycles[-1]))
-        self.surfaces.append([contact.on_grid(interface) for contact, interface in pairs])
-        self.fields.append(self.contacts.fields(state.interfaces, self.peak))
+        self.surfaces.append([contact.on_grid(of_face) for contact, of_face in faces])
+        self.fields.append(self.contacts.fields(state, self.peak))
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class WearResults:
     """
 
     recorder: ResultsRecorder
-    state: CoupledState
+    state: CoupledState[Any]
     unworn: Sequence[FaceLoads]
     line: bool
 
@@ -91,9 +92,10 @@ class WearResults:
         """Return the results as a tree of labelled arrays."""
         import xarray as xr
 
+        worn = self.recorder.contacts.faces(self.state)
         faces = {
-            contact.name: self._face(number)
-            for number, contact in enumerate(self.recorder.contacts.stages)
+            contact.name: self._face(number, contact, state)
+            for number, (contact, state) in enumerate(worn)
         }
         run = xr.Dataset(
             {"drift": self._variable(RUN["drift"], self._recorded(self.state.drift))},
@@ -102,11 +104,11 @@ class WearResults:
         )
         return xr.DataTree.from_dict({"/": run, **faces})
 
-    def _face(self, number: int) -> xr.Dataset:
+    def _face(self, number: int, contact: FaceContact, state: FaceState) -> xr.Dataset:
         """Return the results of one contact face."""
         import xarray as xr
 
-        grid = self.recorder.contacts.stages[number].grid
+        grid = contact.grid
         surfaces = [at[number] for at in self.recorder.surfaces]
         fields = [at[number] for at in self.recorder.fields]
         arrays = {
@@ -118,7 +120,7 @@ class WearResults:
             "slip": np.stack([at.slip for at in fields]),
         }
         rows = self._recorded(self.state.kinetics)[:, number]
-        loads = [self.unworn[number].loads, self.state.interfaces[number].loads]
+        loads = [self.unworn[number].loads, state.loads]
         variables = {name: self._variable(FIELDS[name], array) for name, array in arrays.items()}
         variables |= {
             name: self._variable(SCALARS[name], rows[:, column])
@@ -134,13 +136,10 @@ class WearResults:
             "component": ("component", ["x", "y"]),
             "state": ("state", ["unworn", "worn"]),
         }
-        return xr.Dataset(variables, coords=coordinates, attrs=self._step_errors(number))
-
-    def _step_errors(self, number: int) -> dict[str, float]:
-        """Return the relative errors of depth and volume due to the wear steps, where known."""
-        contact, state = self.recorder.contacts.stages[number], self.state.interfaces[number]
-        errors = step_errors(state, contact.areas) or {}
-        return {f"{name}_error_by_steps": error for name, error in errors.items()}
+        # Relative errors of depth and volume due to the wear steps, where known.
+        errors = step_errors(state, contact.contact.areas) or {}
+        by_steps = {f"{name}_error_by_steps": error for name, error in errors.items()}
+        return xr.Dataset(variables, coords=coordinates, attrs=by_steps)
 
     def _recorded(self, of_all_jumps: Array) -> Array:
         """Return the rows of the jumps that were recorded; for a resumed run, the last ones."""

@@ -5,21 +5,21 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from fe_models.solvers.blas_threads import one_thread
 from sa_solver.errors import InputError
-from wear.contact.interface import FirstContact
+from wear.contact.interface import FirstContact, InterfaceContact
 from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState, Observer
 from wear.schedule import CoupledSettings
 from workflow.errors import ModelWarning
-from workflow.models.contact import Contact, FaceContact, Wear
+from workflow.models.contact import Contact, FaceContact, Wear, border_warnings
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
-from workflow.models.nodal import NodalContacts
+from workflow.models.nodal import nodal_contacts
 from workflow.models.results import ResultsRecorder, WearResults
 from workflow.models.structure import StructureLoads
 from workflow.models.structure_model import StructureModel, StructureStore
@@ -86,18 +86,21 @@ class WearModel:
         if methods == {"nodes"}:
             if not isinstance(loads, StructureLoads):
                 raise InputError("method nodes needs a structure of finite elements")
-            return NodalContacts(faces, self.contact, self.wear, loads)
+            return nodal_contacts(self.contact, self.wear, loads)
         if "nodes" in methods:
             raise InputError("method nodes is for all contacts of a model or for none")
-        return FaceContacts(
-            [FaceContact(face, self.contact(face.face.name), self.wear) for face in faces]
+        return FaceContacts.half_spaces(
+            [
+                FaceContact(face, self.contact(face.face.name), self.wear, InterfaceContact)
+                for face in faces
+            ]
         )
 
     def loop(
         self, loads: LoadSource, contacts: FaceContacts, observers: Sequence[Observer] = ()
-    ) -> CoupledWear:
+    ) -> CoupledWear[Any]:
         """Return the coupled loop of loads and contacts."""
-        return CoupledWear(self.settings(loads), loads, contacts, observers)
+        return CoupledWear(self.settings(loads), loads, contacts.wearing, observers)
 
     def settings(self, loads: LoadSource) -> CoupledSettings:
         """Return the length of the coupled loop, and when it updates the loads."""
@@ -164,11 +167,10 @@ def _warnings(
     """Return what makes results wrong though all solvers converge."""
     if isinstance(loads, StructureLoads):
         yield from (remark.text for remark in loads.remarks() if remark.is_warning)
-    pairs = zip(contacts.stages, first, strict=True)
-    yield from (contact.border_warning for contact, found in pairs if found.touches_border)
+    yield from border_warnings(contacts.stages, first)
 
 
-def check_start(start: CoupledState, unworn: CoupledState) -> None:
+def check_start(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:
     """Raise InputError unless the state to start from fits the model of an ``unworn`` one.
 
     Faces and their gaps must be the same, and the loads too where wear has not changed them yet.

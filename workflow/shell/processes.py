@@ -20,7 +20,7 @@ Task = tuple[Callable[..., Any], tuple[Any, ...]]
 """A function that can be pickled, and its arguments."""
 
 Answering = Callable[..., Any]
-"""Function that a worker serves: given a method's name and its arguments, it returns the answer."""
+"""Function that a worker serves: given a method, or its name, and arguments, it answers."""
 
 Done = Callable[[], None]
 """Called whenever a part of longer work is done, from any thread."""
@@ -37,9 +37,9 @@ class Workers:
         self._processes = processes
 
     def call(
-        self, method: str, *arguments: Sequence[Any], done: Done = _ignore_progress
+        self, method: object, *arguments: Sequence[Any], done: Done = _ignore_progress
     ) -> list[Any]:
-        """Call a method of every worker, each with its share of the ``arguments``.
+        """Have every worker answer for a ``method``, each with its share of the ``arguments``.
 
         ``done`` is called whenever a worker reports that a part is done. Once all have answered, an
         exception of a worker is raised; :class:`MethodFailed` if a process has ended.
@@ -47,7 +47,7 @@ class Workers:
         return self.begin(method, *arguments, done=done)()
 
     def begin(
-        self, method: str, *arguments: Sequence[Any], done: Done = _ignore_progress
+        self, method: object, *arguments: Sequence[Any], done: Done = _ignore_progress
     ) -> Callable[[], list[Any]]:
         """Begin such a call; return a function that waits for the answers and raises as it does.
 

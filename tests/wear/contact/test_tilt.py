@@ -77,7 +77,7 @@ def test_an_inclined_punch_is_held_by_the_moment_of_its_closed_form() -> None:
     for tilt in ("held", "free"):
         contact = interface(grid, strip, tilt, follow=False)
         _, first = contact.begin(history, 1.0)
-        loads = contact.carried(history.loads, first.pressure)
+        loads = contact.settings.drive.carried(grid, history.loads, first.pressure)
         moments[tilt] = loads.My
         assert (loads is history.loads) == (tilt == "free")
     # The gap opens towards x > 0, so the pressure sits at x < 0 and My = -Σ p x S is positive.
@@ -100,7 +100,7 @@ def test_the_moments_that_hold_a_tilt_leave_none_when_they_are_imposed(method, o
         settings["drive"] = moved(history, "held")
     contact = interface(grid, gap, "held", **settings)
     state, first = contact.begin(history, 1.0)
-    loads = contact.carried(state.loads, first.pressure)
+    loads = contact.settings.drive.carried(grid, state.loads, first.pressure)
     assert np.abs(loads.Mx).min() > 1e-3 * P
     assert np.abs(loads.My).min() > 1e-3 * P
     if method == "normal":

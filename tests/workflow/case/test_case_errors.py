@@ -224,6 +224,7 @@ def test_every_error_has_its_line(tmp_path, dovetail_text):
         ("wear.step.0.kind=explicit", "unknown key"),
         ("x" * 100_000 + "=1", "unknown key"),
         ("a." * 1000 + "a=1", "nested too deeply"),
+        ("contact.grid=[]", "a list of 0: too short"),  # one line, though two items are missing
         ("contact.grid." + "9" * 5000 + "=1", "no such entry"),
     ],
 )

@@ -170,7 +170,7 @@ TURNING = "{legs: [{P: 60 N, Qx: 12 N}, {P: 40 N, Qx: -12 N}]}"
 def cycle_energy(case: BodiesWearCase, parts: int = 1) -> float:
     """Return the energy that an unworn cycle dissipates, with increments in ``parts`` [N mm]."""
     source = BodiesSource(case, parts)
-    _, first = face_contact(case, source.faces[0]).begin(source.unworn()[0], 1.0)
+    _, first = face_contact(case, source.faces[0]).contact.begin(source.unworn()[0], 1.0)
     return float(first.energy.sum())
 
 

@@ -48,10 +48,10 @@ def worn(
     """Return the contact after the cycles of the case, computed in this process."""
     source = BodiesSource(case)
     stage = face_contact(case, source.faces[0])
-    state, _ = stage.begin(source.unworn()[0], case.wear.cycles)
+    state, _ = stage.contact.begin(source.unworn()[0], case.wear.cycles)
     for jump in range(jumps):
         left = case.wear.cycles * (1.0 - jump / jumps)
-        state, _ = stage.jump(state, case.wear.cycles / jumps, left)
+        state, _ = stage.contact.jump(state, case.wear.cycles / jumps, left)
     return stage, state
 
 
@@ -236,7 +236,7 @@ def test_partial_slip_over_a_given_stroke_is_that_of_mindlin() -> None:
     )
     source = BodiesSource(case)
     stage = face_contact(case, source.faces[0])
-    _, first = stage.begin(source.unworn()[0], case.wear.cycles)
+    _, first = stage.contact.begin(source.unworn()[0], case.wear.cycles)
     assert first.energy.sum() == pytest.approx(0.414092, rel=2e-2)
     forces = [state.resultants[1] for state in first.cycle]
     assert max(forces) == pytest.approx(210.0, rel=2e-2)
@@ -311,7 +311,7 @@ def test_a_loop_on_worn_surfaces_keeps_the_tilt_too() -> None:
     for tilt, moments in (("held", None), ("free", (0.0, 0.0))):
         case = line(f"load_path.tilt={tilt}", "loops.amplitude=1 um")
         stage = face_contact(case, BodiesSource(case).faces[0])
-        state, _ = stage.begin(BodiesSource(case).unworn()[0], 1.0)
+        state, _ = stage.contact.begin(BodiesSource(case).unworn()[0], 1.0)
         path = case.loops.described().path(stage.name, state, 0, stage.settings.drive.tilt)
         assert path.moments == moments
 

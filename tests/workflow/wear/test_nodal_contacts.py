@@ -9,6 +9,7 @@ import pytest
 
 from sa_solver.types import Array
 from tests.conftest import CASES
+from wear.contact.nodes import NodalState
 from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState
 from wear.steps.step_errors import step_errors
@@ -17,7 +18,9 @@ from workflow.analyses.wear.translation import contact_of, wear_of
 from workflow.chart.axes import axes_of
 from workflow.errors import CaseError
 from workflow.kinds import load_case
-from workflow.models.nodal import NodalContacts, StructureCycle
+from workflow.models.contact import last_cycle
+from workflow.models.contacts import FaceContacts
+from workflow.models.nodal import StructureCycle, nodal_contacts
 from workflow.models.structure import StructureLoads
 from workflow.shell.folders.packing import packed, unpacked
 
@@ -35,47 +38,48 @@ class Wearing:
     """Wear loop of a case whose nodes wear."""
 
     source: StructureLoads
-    contacts: NodalContacts
-    loop: CoupledWear
+    contacts: FaceContacts
+    loop: CoupledWear[NodalState]
 
     @classmethod
     def of(cls, *overrides: str) -> "Wearing":
         case = load_case(PLANE, (*NODES, *overrides))
         source = structure_of(case).source(case)
         assert isinstance(source, StructureLoads)
-        contacts = NodalContacts(source.faces, partial(contact_of, case), wear_of(case), source)
-        return cls(source, contacts, CoupledWear(wear_of(case).coupled(), source, contacts))
+        wear = wear_of(case)
+        contacts = nodal_contacts(partial(contact_of, case), wear, source)
+        return cls(source, contacts, CoupledWear(wear.coupled(), source, contacts.wearing))
 
-    def states(self) -> Iterator[CoupledState]:
+    def states(self) -> Iterator[CoupledState[NodalState]]:
         state, _ = self.loop.begin(self.source.unworn())
         yield state
         yield from self.loop.march(state)
 
-    def worn(self, state: CoupledState) -> tuple[Array, Array, Array]:
+    def worn(self, state: CoupledState[NodalState]) -> tuple[Array, Array, Array]:
         """Return places along a flank, depth of both bodies there, and pressure at peak load."""
-        stage, face = self.contacts.stages[0], state.interfaces[0]
+        stage, face = self.contacts.stages[0], self.contacts.states(state)[0]
         x = stage.face.coordinates[:, 0]
         order = np.argsort(x)
-        pressure = self.contacts.stages[0].history(face).pressure[self.source.peak]
+        pressure = face.cycle().pressure[self.source.peak]
         return x[order], face.surfaces.depth[order], pressure[order]
 
 
 @pytest.fixture(scope="module")
-def coarse() -> tuple[Wearing, list[CoupledState]]:
+def coarse() -> tuple[Wearing, list[CoupledState[NodalState]]]:
     wearing = Wearing.of(*COARSE)
     return wearing, list(wearing.states())
 
 
 def test_volume_is_energy_and_flanks_wear_alike(coarse) -> None:
     wearing, states = coarse
-    (one, two), rows = states[-1].interfaces, states[-1].kinetics[-1]
+    (one, two), rows = wearing.contacts.states(states[-1]), states[-1].kinetics[-1]
     assert states[-1].cycles[-1] == 1e5
     for face, (_, _, volume_1, volume_2, energy) in zip((one, two), rows, strict=True):
         assert volume_1 == pytest.approx(ALPHA * energy, rel=1e-12)
         assert volume_2 == pytest.approx(ALPHA * energy, rel=1e-12)
         assert energy == face.energy > 0.0
     np.testing.assert_allclose(rows[0], rows[1], rtol=1e-4)
-    errors = step_errors(one, wearing.contacts.stages[0].areas)
+    errors = step_errors(one, wearing.contacts.stages[0].contact.areas)
     assert errors is not None
     assert max(errors.values()) < 0.01  # wear.tolerance
 
@@ -83,17 +87,17 @@ def test_volume_is_energy_and_flanks_wear_alike(coarse) -> None:
 def test_forces_stay_those_of_the_balance(coarse) -> None:
     """Forces balance also on the cells that are written, which lose no volume."""
     wearing, states = coarse
-    state = states[-1]
-    tractions = [end.tractions for end in wearing.contacts.ends(state.interfaces)()]
-    for stage, face, on_cells in zip(
-        wearing.contacts.stages, state.interfaces, tractions, strict=True
-    ):
+    faces = wearing.contacts.states(states[-1])
+    tractions = [end.tractions for end in wearing.contacts.call(last_cycle, faces)]
+    for stage, face, on_cells in zip(wearing.contacts.stages, faces, tractions, strict=True):
         peak, area = wearing.source.peak, stage.grid.cell_area
         assert face.loads.P[peak] == pytest.approx(LOAD, rel=2e-4)
         assert on_cells.pressure[peak].sum() * area == pytest.approx(LOAD, rel=2e-4)
         assert on_cells.shear[peak, 0].sum() * area == pytest.approx(-FRICTION * LOAD, rel=2e-4)
         depth = stage.on_grid(face).depth
-        assert depth.sum() * area == pytest.approx(stage.volume(face.surfaces.depth), rel=1e-12)
+        assert depth.sum() * area == pytest.approx(
+            stage.contact.volume(face.surfaces.depth), rel=1e-12
+        )
 
 
 def test_a_cycle_dissipates_as_finely_divided_ones_do() -> None:
@@ -120,8 +124,8 @@ def test_a_run_goes_on_from_what_the_disk_keeps(coarse) -> None:
     middle = unpacked(packed(states[len(states) // 2])[0])
     again = Wearing.of(*COARSE)
     *_, end = again.loop.march(middle)
-    for one, two in zip(end.interfaces, states[-1].interfaces, strict=True):
-        np.testing.assert_array_equal(one.surfaces.depth, two.surfaces.depth)
+    (one,), (other,) = end.interfaces, states[-1].interfaces
+    np.testing.assert_array_equal(one.surfaces.depth, other.surfaces.depth)
     np.testing.assert_array_equal(end.kinetics, states[-1].kinetics)
 
 

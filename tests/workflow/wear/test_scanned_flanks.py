@@ -24,7 +24,8 @@ def solved(path, *changes):
     source = structure_of(case).source(case)
     pairs = zip(source.unworn(), source.faces, strict=True)
     return [
-        (history.loads, face_contact(case, face).begin(history, 1.0)[1]) for history, face in pairs
+        (history.loads, face_contact(case, face).contact.begin(history, 1.0)[1])
+        for history, face in pairs
     ]
 
 

@@ -199,25 +199,22 @@ def test_sections_add_up_to_the_resultants():
 
 @pytest.fixture(scope="module")
 def slot(small_path):
-    """Return sources and stages of the small case, coarse, in three dimensions."""
+    """Return source and unworn contacts of the small case, coarse, in three dimensions."""
     case = load_case(
         small_path, ["mesh.flank_nodes=[6, 8]", "mesh.size=12", "contact.grid=[24, 48]"]
     )
     source = structure_of(case).source(case)
     stages = [face_contact(case, face) for face in source.faces]
-    return (
-        source,
-        stages,
-        [
-            stage.begin(history, case.wear.cycles)[0]
-            for stage, history in zip(stages, source.unworn(), strict=True)
-        ],
-    )
+    return source, [
+        (stage, stage.contact.begin(history, case.wear.cycles)[0])
+        for stage, history in zip(stages, source.unworn(), strict=True)
+    ]
 
 
 def test_uniformity_of_a_slot(slot):
     """Both flanks are equal; ends carry more than the middle; the text fits the numbers."""
-    source, stages, _ = slot
+    source, faces = slot
+    stages = [stage for stage, _ in faces]
     flanks = uniformities(*slot)
     assert set(flanks) == {"intrados", "extrados"}
     one, two = flanks.values()
@@ -234,18 +231,18 @@ def test_uniformity_of_a_slot(slot):
 
 
 def test_what_has_worn_unevenly_is_not_uniform(slot):
-    source, stages, states = slot
+    source, ((stage, state), other) = slot
     before = uniformities(*slot)["intrados"]
-    y = stages[0].grid.y
-    worn = np.where(np.abs(y) > 6.0, 2e-3, 1e-3) * np.ones(stages[0].grid.shape)
-    surfaces = replace(states[0].surfaces, depth_1=worn)
-    after = uniformities(source, stages, [replace(states[0], surfaces=surfaces), states[1]])
+    y = stage.grid.y
+    worn = np.where(np.abs(y) > 6.0, 2e-3, 1e-3) * np.ones(stage.grid.shape)
+    surfaces = replace(state.surfaces, depth_1=worn)
+    after = uniformities(source, [(stage, replace(state, surfaces=surfaces)), other])
     uniformity = after["intrados"]
     assert uniformity.wear == pytest.approx(1.0)
     # The last row of the middle is the one before the step.
     rows = np.abs(y.ravel())
     assert uniformity.share_of_length_within == pytest.approx(
-        min((rows[rows > 6.0].min() - 0.5 * stages[0].grid.pitch[1]) / 30.0,
+        min((rows[rows > 6.0].min() - 0.5 * stage.grid.pitch[1]) / 30.0,
             before.share_of_length_within)
     )  # fmt: skip
     assert not uniformity.uniform
@@ -256,7 +253,7 @@ def test_a_section_or_a_file_has_no_uniformity(plane_path):
     case = load_case(plane_path, ["mesh.flank_nodes=[6, 8]"])
     source = structure_of(case).source(case)
     assert source.line
-    assert uniformities(source, [], []) == {}
+    assert uniformities(source, []) == {}
 
 
 # --- Who chooses -----------------------------------------------------------------------------

@@ -7,16 +7,12 @@ from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
 
-from sa_solver.types import Tally
-from wear.contact.contacts import Contacts
-from wear.contact.face_loads import FaceLoads
-from wear.contact.interface import FirstContact, InterfaceState
-from wear.worn import Cost
+from sa_solver.types import Tally, unseen
+from wear.contact.contacts import Answer, call_in_turn
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.translation import face_contact
-from workflow.models.contact import ContactEnd, FaceContact
-from workflow.models.contacts import FaceContacts
 from workflow.models.loads import ContactFace
+from workflow.models.progress import ReportsProgress
 from workflow.shell.processes import Done, Workers, workers
 
 # Estimated ratio of frictional increments in the first jump to those in the first cycle. Implicit
@@ -34,51 +30,38 @@ def contact_workers(
 
 def _worker(case: WearCase, face: ContactFace, solved: Done) -> Callable[..., Any]:
     """Return the function that answers for one contact; ``solved`` is called per increment."""
-    stage = face_contact(case, face)
-    stage.solved = solved
-    contacts = Contacts([stage])
+    contact = face_contact(case, face).contact
+    contact.solved = solved
 
-    def answer(method: str, *arguments: Any) -> Any:
-        (result,) = contacts.call(method, *([argument] for argument in arguments))
+    def answer(function: Callable[[Any, Any], Any], share: Any) -> Any:
+        (result,) = call_in_turn([contact], function, [share])
         return result
 
     return answer
 
 
-class ContactProcesses(FaceContacts):
-    """Contacts that wear in parallel processes; quick tasks run here on equal ``stages``."""
+class WorkerCalls(ReportsProgress):
+    """Calls of a function for contacts in worker processes, one for each contact.
 
-    def __init__(self, stages: Sequence[FaceContact], team: Workers) -> None:
-        super().__init__(stages)
-        self._team, self._expected = team, 1
+    It is a :class:`wear.contact.contacts.Call`. The first call that reports progress solves a
+    cycle of as many ``increments`` as all contacts have; the number solved in a call is the
+    estimate for the next one.
+    """
 
-    def begin(
-        self, histories: Sequence[FaceLoads], cycles: float
-    ) -> list[tuple[InterfaceState, FirstContact]]:
-        self._expected = sum(len(history.loads) for history in histories)
-        begun = self._counted("begin", histories, self.each(cycles))
-        self._expected *= FIRST_JUMP
-        return begun
+    def __init__(self, team: Workers, increments: int) -> None:
+        self._team, self._expected, self._growth = team, increments, FIRST_JUMP
 
-    def jump(
-        self, states: Sequence[InterfaceState], cycles: float, left: float
-    ) -> list[tuple[InterfaceState, Cost]]:
-        return self._counted("jump", states, self.each(cycles), self.each(left))
-
-    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
-        return self._team.call(method, *arguments)
-
-    def ends(self, states: Sequence[InterfaceState]) -> Callable[[], list[ContactEnd]]:
-        return self._team.begin("end", states)
-
-    def _counted(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
-        """Return the workers' answers; the increments of a call are the next call's estimate."""
+    def __call__(
+        self, function: Callable[[Any, Any], Answer], shares: Sequence[Any]
+    ) -> list[Answer]:
         progress = self._progress
+        if progress is unseen:
+            return self._team.call(function, shares)
 
         def reported(done: int, expected: int) -> None:
             progress(done, max(done, expected))
 
         solved = Tally(reported, self._expected)
-        answers = self._team.call(method, *arguments, done=solved)
-        self._expected = max(solved.done, 1)
+        answers = self._team.call(function, shares, done=solved)
+        self._expected, self._growth = max(solved.done, 1) * self._growth, 1
         return answers

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from sa_solver.types import Array
 from wear.coupled_state import CoupledState, Observer
@@ -55,17 +56,17 @@ class RunLog(Observer):
     source: LoadSource
 
     def stage(self, name: str) -> AbstractContextManager[object]:
-        working = self.source if name == "structural friction" else self.contacts
+        working = self.source if name == "structural friction" else self.contacts.call
         return reported_stage(self.run.reporter, working, name, "increments")
 
-    def jump_started(self, state: CoupledState, cycles: float) -> None:
+    def jump_started(self, state: CoupledState[Any], cycles: float) -> None:
         step = self.run.case.wear.step
         if step.kind == "explicit" and step.fraction is None:
-            warn_of_instability(self.contacts.stages, state, cycles, self.run.reporter)
+            warn_of_instability(self.contacts.faces(state), cycles, self.run.reporter)
 
-    def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
+    def jump_finished(self, before: CoupledState[Any], after: CoupledState[Any]) -> None:
         if self.run.case.contact.method != "nodes":
-            warn_of_growth(self.contacts.stages, after, self.run.reporter)
+            warn_of_growth(self.contacts.faces(after), self.run.reporter)
         drift, cost = after.drift[-1], after.cost - before.cost
         if after.solutions > before.solutions:
             self.run.reporter.log(f"drift {percent(drift)}: loads computed again")
@@ -76,7 +77,7 @@ class RunLog(Observer):
             f"{cost.convolutions} convolutions, drift {percent(drift)}"
         )
 
-    def remaining(self, state: CoupledState, jumps: int) -> None:
+    def remaining(self, state: CoupledState[Any], jumps: int) -> None:
         reporter, done, total = self.run.reporter, state.jump, state.jump + jumps
         if done == MANY_JUMPS:
             warn_of_many_jumps(self.run.case.wear, state, jumps, reporter)
@@ -95,33 +96,32 @@ class FileRecorder(Observer):
     source: LoadSource
     steps: RunSteps
 
-    def begin(self, state: CoupledState) -> None:
+    def begin(self, state: CoupledState[Any]) -> None:
         if self.run.kept is None:
             self.record(state)
 
-    def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
+    def jump_finished(self, before: CoupledState[Any], after: CoupledState[Any]) -> None:
         self.record(after)
 
-    def record(self, state: CoupledState) -> None:
+    def record(self, state: CoupledState[Any]) -> None:
         """Write the fields of this jump."""
-        loops = self._loops(state)
+        faces, loops = self.contacts.faces(state), self._loops(state)
         with self.run.reporter.stage("checkpoints"):
-            recorded = self.contacts.fields(state.interfaces, self.peak)
+            recorded = self.contacts.fields(state, self.peak)
             arrays: dict[str, Array] = {}
-            stages = self.contacts.stages
-            for stage, interface, fields in zip(stages, state.interfaces, recorded, strict=True):
+            for (stage, of_face), fields in zip(faces, recorded, strict=True):
                 name = stage.name
-                for body, height in enumerate(stage.on_grid(interface).heights, start=1):
+                for body, height in enumerate(stage.on_grid(of_face).heights, start=1):
                     arrays[f"surfaces/{name}/body_{body}"] = height
                 arrays |= {f"contact/{name}/{k}": field for k, field in vars(fields).items()}
-            arrays |= loops | stored_tensions(self.source, state)
+            arrays |= loops | stored_tensions(self.source, faces)
             self.steps.record(state.jump, arrays, {"cycles": float(state.cycles[-1])})
 
-    def _loops(self, state: CoupledState) -> dict[str, Array]:
+    def _loops(self, state: CoupledState[Any]) -> dict[str, Array]:
         """Return the tangential loops on the present surfaces, if they are due."""
         loops = self.run.case.loops.described()
         if loops is None or not loops.due(state.jump, self.settings.ended(state)):
             return {}
         with self.run.reporter.stage("tangential loops"):
-            found = self.contacts.loops(state.interfaces, self.peak, loops)
-        return stored_loops(self.contacts.names, found)
+            found = self.contacts.loops(state, self.peak, loops)
+        return stored_loops([stage.name for stage in self.contacts.stages], found)

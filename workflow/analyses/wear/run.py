@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import cache, partial
 from threading import Lock
+from typing import Any
 
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.solvers.blas_threads import one_thread
@@ -23,10 +24,7 @@ from workflow.analyses.wear.checks.warnings import (
     warn_of_worn_cells,
 )
 from workflow.analyses.wear.choice import report_choice
-from workflow.analyses.wear.contact_workers import (
-    ContactProcesses,
-    contact_workers,
-)
+from workflow.analyses.wear.contact_workers import WorkerCalls, contact_workers
 from workflow.analyses.wear.model import wear_model
 from workflow.analyses.wear.output.outcome import InterfaceOutcome, Outcome
 from workflow.analyses.wear.output.results import write_output
@@ -37,7 +35,7 @@ from workflow.analyses.wear.structures.resultants.writing import marched
 from workflow.analyses.wear.translation import check_section
 from workflow.analyses.wear.worn.worn_structure import nonlinearity_sentence
 from workflow.errors import MethodFailed, UserError
-from workflow.models.contact import ContactEnd
+from workflow.models.contact import ContactEnd, last_cycle
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import ContactFace, LoadSource
 from workflow.models.structure import StructureLoads
@@ -45,7 +43,6 @@ from workflow.models.wear import WearModel
 from workflow.shell.analysis import Run
 from workflow.shell.folders.cache import DiskStore
 from workflow.shell.folders.steps import RunSteps, resumable_steps
-from workflow.shell.processes import Workers
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -88,9 +85,8 @@ def _compute(
     faces = meshed_faces(case, source, reporter)
     for face in faces:
         check_section(case, face)
-    workers = working.enter_context(
-        contact_workers(case, faces if _wears_in_workers(case, source) else ())
-    )
+    in_workers = _wears_in_workers(case, source)
+    workers = working.enter_context(contact_workers(case, faces if in_workers else ()))
     with reported_stage(reporter, source, "condensation", "steps"):
         source.prepare()
     probe_results = begin_probe_runs(case, source, run.worker)
@@ -103,10 +99,17 @@ def _compute(
         if isinstance(source, ResultantsSource):
             warn_of_file(source, reporter)
         with reporter.stage("contact set-up"):
-            contacts = _contacts(case, model, source, workers)
+            contacts = model.face_contacts(source)
+            if in_workers:
+                call = WorkerCalls(workers, sum(len(history.loads) for history in unworn))
+                contacts = FaceContacts.half_spaces(contacts.stages, call)
         state, first = _march(run, model, source, contacts, unworn, steps)
-        ends = _last_cycles(contacts.ends(state.interfaces), working, len(faces))
-    columns = contacts.stages, unworn, first, state.interfaces, ends
+        states = contacts.states(state)
+        answers: Callable[[], list[ContactEnd]] = partial(contacts.call, last_cycle, states)
+        if in_workers:
+            answers = workers.begin(last_cycle, states)  # at once, while stress is computed here
+        ends = _last_cycles(answers, working, len(faces))
+    columns = contacts.stages, unworn, first, states, ends
     finer = partial(structure_of(case).finer_cycles, case)
     interfaces = [
         InterfaceOutcome(*column, state.cycles, state.kinetics[:, number], finer)
@@ -136,16 +139,6 @@ def _last_cycles(
     return [partial(tell, number) for number in range(contacts)]
 
 
-def _contacts(
-    case: WearCase, model: WearModel, source: LoadSource, workers: Workers
-) -> FaceContacts:
-    """Return the contacts: half-spaces in worker processes or here, or nodes of the structure."""
-    contacts = model.face_contacts(source)
-    if _wears_in_workers(case, source):
-        return ContactProcesses(contacts.stages, workers)
-    return contacts
-
-
 def _wears_in_workers(case: WearCase, source: LoadSource) -> bool:
     """Return whether contacts wear in workers; line contacts are faster than starting workers."""
     method = case.contact.method
@@ -159,17 +152,17 @@ def _march(
     contacts: FaceContacts,
     unworn: Sequence[FaceLoads],
     steps: RunSteps,
-) -> tuple[CoupledState, list[FirstContact]]:
+) -> tuple[CoupledState[Any], list[FirstContact]]:
     """Return the final state, and the first contacts."""
     case, reporter, settings = run.case, run.reporter, model.settings(source)
     recorder = FileRecorder(run, settings, source.peak, contacts, source, steps)
     loop = model.loop(source, contacts, (RunLog(run, contacts, source), recorder))
     state, first = loop.begin(unworn)
-    warn_of_contact(case, source, contacts.stages, state, first, reporter)
+    warn_of_contact(case, source, contacts.faces(state), first, reporter)
     with reporter.course("wear"):
         end = loop.run(state, steps)
     steps.save()
-    warn_of_worn_cells(case, source.peak, contacts.stages, end, reporter)
+    warn_of_worn_cells(case, source.peak, contacts.faces(end), reporter)
     return end, first
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
+from wear.contact.interface import InterfaceContact
 from wear.schedule import JumpSize, Stop
 from workflow.analyses.wear.case.base import WearCase
 from workflow.errors import UserError
@@ -51,10 +52,14 @@ def wear_of(case: WearCase) -> Wear:
 
 def face_contact(
     case: WearCase, face: ContactFace, stepper: WearStepper | None = None
-) -> FaceContact:
-    """Return the contact of a face; it wears by the steps of the case unless others are given."""
+) -> FaceContact[InterfaceContact]:
+    """Return the half-space contact of a face.
+
+    It wears by the steps of the case unless others are given.
+    """
     check_section(case, face)
-    return FaceContact(face, contact_of(case, face.face.name), wear_of(case), stepper)
+    contact = contact_of(case, face.face.name)
+    return FaceContact(face, contact, wear_of(case), InterfaceContact, stepper)
 
 
 def structure_loads(

@@ -74,7 +74,7 @@ class Explanation:
             case "disagreement":
                 return self._disagreeing(path, context["keys"]), details["msg"]
             case "missing":
-                return self._missing(path)
+                return self._missing(path, details["input"])
             case "extra_forbidden":
                 return path, self._unknown(path)
             case "union_tag_not_found" | "union_tag_invalid":
@@ -89,11 +89,13 @@ class Explanation:
         overridden = [p for p in paths if self.source.is_override(p)]
         return (overridden or paths or [path])[0]
 
-    def _missing(self, path: KeyPath) -> tuple[KeyPath, str]:
+    def _missing(self, path: KeyPath, given: Any) -> tuple[KeyPath, str]:
+        """Return the place and the sentence, which is the same for all missing items of a list."""
         *parent, key = path
         if isinstance(key, int):
             place = tuple(parent)
-            return place, f"a list of {key}: too short; allowed: a longer one{self._example(place)}"
+            longer = f"a longer one{self._example(place)}"
+            return place, f"a list of {len(given)}: too short; allowed: {longer}"
         field = self._field_at(path)
         assert field is not None
         return path, f"missing; allowed: {field.description}{self._example(path)}"

@@ -29,7 +29,7 @@ COARSE = [
 
 
 def begun(source, stage, loads):
-    state, first = stage.begin(loads, 1.0)
+    state, first = stage.contact.begin(loads, 1.0)
     return source, stage, state, first
 
 
@@ -42,12 +42,8 @@ def of_file(folder: Path, energy: float):
 
 def warnings_of(folder, case, source, stage, state, first) -> list[str]:
     """Return the warnings about energies."""
-
-    class Both:
-        interfaces = (state,)
-
     reporter = Reporter(folder / "log")
-    warn_of_contact(case, source, [stage], Both, [first], reporter)
+    warn_of_contact(case, source, [(stage, state)], [first], reporter)
     return [line for line in reporter.warnings if "dissipate" in line]
 
 

@@ -89,7 +89,7 @@ def solved(path: Path, *settings: str) -> tuple[InterfaceHistory, FaceContact, F
     case = load_case(path, list(settings))
     source = structure_of(case).source(case)
     (history,), stage = source.unworn(), face_contact(case, source.faces[0])
-    return history, stage, stage.begin(history, 1.0)[1]
+    return history, stage, stage.contact.begin(history, 1.0)[1]
 
 
 def error(pressure: Array, exact: Array) -> float:

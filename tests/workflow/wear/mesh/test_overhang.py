@@ -21,6 +21,6 @@ def test_nothing_is_carried_where_one_body_is_not(tmp_path: Path) -> None:
     assert history.interface.coordinates[:, 0].max() + origin > END + pitch
     gap, both = stage.settings.gap[:, 0], (x < END) & (x > FOOT[0])
     np.testing.assert_allclose(gap[both], 0.5 * local[both] ** 2 / RADIUS, atol=1e-12)
-    pressure = stage.unworn_tractions(history, first).pressure[0, :, 0]
+    pressure = stage.contact.unworn_tractions(history, first).pressure[0, :, 0]
     assert not pressure[~both].any()
     assert pressure[both].sum() * pitch == pytest.approx(LOAD, rel=1e-6)

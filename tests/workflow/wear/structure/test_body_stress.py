@@ -57,7 +57,7 @@ class Flank:
         states = {"unworn": (source.mesh, source.unworn_cycle)}
         stress = source.stresses(states)["unworn"]
         stage, loads = face_contact(case, source.faces[0]), source.unworn()[0]
-        given = stage.unworn_tractions(loads, stage.begin(loads, 1.0)[1])
+        given = stage.contact.unworn_tractions(loads, stage.contact.begin(loads, 1.0)[1])
         known = with_known_shear(stage, given, loads)
         cycle = StressedCycle(known, loads, stress.faces[0], stress.fields)
         bodies = StressedBody(stage, case.material(1), 1), StressedBody(stage, case.material(2), 2)

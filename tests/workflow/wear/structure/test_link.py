@@ -52,7 +52,7 @@ def flank(path, nodes: int, *settings: str) -> tuple[InterfaceHistory, FaceConta
     source = structure_of(case).source(case)
     stage = face_contact(case, source.faces[0])
     history = source.unworn()[0]
-    return history, stage, stage.begin(history, 1.0)[1]
+    return history, stage, stage.contact.begin(history, 1.0)[1]
 
 
 def at_places(x: Array, values: Array) -> Array:

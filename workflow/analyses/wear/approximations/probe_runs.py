@@ -13,8 +13,8 @@ from typing import Any, Literal
 
 from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.normal.contact import NormalContactError
-from wear.contact.contacts import Contacts
-from wear.contact.interface import MotionError
+from sa_solver.types import Array
+from wear.contact.interface import InterfaceContact, MotionError
 from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState
 from wear.schedule import CoupledSettings, JumpSize
@@ -27,6 +27,7 @@ from workflow.analyses.wear.translation import face_contact
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed, UserError
 from workflow.models.contact import FaceContact
+from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 
 Numbers = dict[str, dict[str, float]]  # by interface and quantity
@@ -49,7 +50,7 @@ LESSER_INTERFACE = 0.1
 class ProbeRun:
     """Contacts of a probe run, and its states from the unworn one to the last."""
 
-    contacts: list[FaceContact]
+    contacts: list[FaceContact[InterfaceContact]]
     states: list[CoupledState]
 
     @property
@@ -57,9 +58,15 @@ class ProbeRun:
         """Largest depth [mm] and volume [mm³, per length mm²] of both bodies, by interface."""
         depths = [interface.surfaces.depth for interface in self.states[-1].interfaces]
         return {
-            contact.name: {"depth": float(depth.max()), "volume": contact.volume(depth)}
+            contact.name: {"depth": float(depth.max()), "volume": contact.contact.volume(depth)}
             for contact, depth in zip(self.contacts, depths, strict=True)
         }
+
+    @property
+    def nodal_depths(self) -> list[Array]:
+        """Worn depth of both bodies at the nodes of every face at the end ``(n,)`` [mm]."""
+        pairs = zip(self.contacts, self.states[-1].interfaces, strict=True)
+        return [contact.contact.at_nodes(state.surfaces.depth) for contact, state in pairs]
 
     @property
     def worn_and_pressed(self) -> Numbers:
@@ -109,7 +116,7 @@ def probe_run(
         stages = [face_contact(case, face, ImplicitStepper(alone=True)) for face in source.faces]
     else:
         stages = begun.contacts
-    cycles, contacts = case.wear.cycles, Contacts(stages)
+    cycles, contacts = case.wear.cycles, FaceContacts.half_spaces(stages).wearing
     settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)
     loop = CoupledWear(settings, source, contacts)
     state = loop.begin(source.unworn())[0] if begun is None else begun.states[0]

@@ -8,7 +8,6 @@ middle. Pressure and slip are the structure's, wear is the half-space's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +16,9 @@ from fe_models.meshes.transfer import FaceTransfer
 from fe_models.structure import InterfaceHistory
 from sa_solver.cycles.increments import friction_work
 from sa_solver.types import Array
-from wear.contact.interface import InterfaceState
 from workflow.case.text.plain import shares
 from workflow.case.text.readable import percent
-from workflow.models.contact import FaceContact
+from workflow.models.contact import FaceContact, FaceState, WornFaces
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 
@@ -110,21 +108,19 @@ class Uniformity:
         )
 
 
-def uniformities(
-    source: LoadSource, stages: Sequence[FaceContact], states: Sequence[InterfaceState]
-) -> dict[str, Uniformity]:
+def uniformities(source: LoadSource, faces: WornFaces) -> dict[str, Uniformity]:
     """Return the uniformity of every loaded contact of a 3D structure, by interface."""
     if not isinstance(source, StructureLoads) or source.line:
         return {}
     return {
         stage.name: result
-        for stage, history, state in zip(stages, source.unworn(), states, strict=True)
+        for (stage, state), history in zip(faces, source.unworn(), strict=True)
         if (result := uniformity(stage, history, state, source.peak)) is not None
     }
 
 
 def uniformity(
-    stage: FaceContact, history: InterfaceHistory, state: InterfaceState, peak: int
+    stage: FaceContact, history: InterfaceHistory, state: FaceState, peak: int
 ) -> Uniformity | None:
     """Return the uniformity of unworn contact and wear so far; None without load in the middle."""
     carried = sections(stage.transfer, history, peak, stage.settings.friction(0.0))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from fe_models.meshes.structure_mesh import Face, Interface
@@ -16,7 +19,7 @@ from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
-from workflow.models.contact import FaceContact
+from workflow.models.contact import FaceContact, WornFaces, border_warnings
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 from workflow.shell.few_cells import check_cells
@@ -134,15 +137,15 @@ def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:
 def warn_of_contact(
     case: WearCase,
     source: LoadSource,
-    stages: list[FaceContact],
-    state: CoupledState,
-    first: list[FirstContact],
+    faces: WornFaces,
+    first: Sequence[FirstContact],
     reporter: Reporter,
 ) -> None:
     """Warn of dissimilar bodies, yielding, contacts at the border or on few cells, and edge peaks.
 
     Raises UserError if a contact has too few cells.
     """
+    stages = [stage for stage, _ in faces]
     unlike = [stage.pair for stage in stages if not stage.pair.similar]
     if case.contact.method == "normal" and unlike:
         pair = max(unlike, key=lambda pair: abs(pair.dundurs_beta))
@@ -152,7 +155,9 @@ def warn_of_contact(
             f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}), so shear moves the "
             f"surfaces normally, which contact.method: normal {has}: use full"
         )
-    for stage, interface, result in zip(stages, state.interfaces, first, strict=True):
+    for line in border_warnings(stages, first):
+        reporter.warn(line)
+    for (stage, state), result in zip(faces, first, strict=True):
         terms = case.terms(stage.name)
         yield_stress = min(material.yield_stress for material in terms.materials)
         if case.contact.method != "nodes":
@@ -165,13 +170,11 @@ def warn_of_contact(
             )
         if case.contact.method == "nodes":
             continue  # the grid only shows them
-        if warning := _energies_differ(source, stage, interface.loads, result):
+        if warning := _energies_differ(source, stage, state.loads, result):
             reporter.warn(f"{stage.name}: {warning}")
-        if result.touches_border:
-            reporter.warn(stage.border_warning)
         settings, pressure = case.contact_of(stage.name), result.pressure[source.peak]
         check_cells(stage.name, settings, stage.grid, pressure, reporter)
-        for line in structure_of(case).warnings(case, stage, float(interface.loads.P[source.peak])):
+        for line in structure_of(case).warnings(case, stage, float(state.loads.P[source.peak])):
             reporter.warn(line)
 
 
@@ -214,12 +217,9 @@ def _work_of_sliding(stage: FaceContact, loads: LoadHistory) -> float:
     return float(shear**2 / (modulus * width))
 
 
-def warn_of_instability(
-    stages: list[FaceContact], state: CoupledState, cycles: float, reporter: Reporter
-) -> None:
+def warn_of_instability(faces: WornFaces, cycles: float, reporter: Reporter) -> None:
     """Warn of explicit steps with more cycles than is stable."""
-    pairs = zip(stages, state.interfaces, strict=True)
-    stable = min(stage.stable_cycles(interface) for stage, interface in pairs)
+    stable = min(stage.contact.stable_cycles(state) for stage, state in faces)
     if cycles > stable:
         reporter.warn(
             f"explicit wear steps above {stable:.3g} cycles amplify the roughness of the grid: "
@@ -227,15 +227,17 @@ def warn_of_instability(
         )
 
 
-def warn_of_growth(stages: list[FaceContact], state: CoupledState, reporter: Reporter) -> None:
+def warn_of_growth(faces: WornFaces, reporter: Reporter) -> None:
     """Warn of half-space contacts that have worn up to the border of their grid."""
-    for stage, interface in zip(stages, state.interfaces, strict=True):
-        worn = interface.surfaces.depth
+    for stage, state in faces:
+        worn = state.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
             reporter.warn(stage.border_warning)
 
 
-def warn_of_many_jumps(wear: Duration, state: CoupledState, left: int, reporter: Reporter) -> None:
+def warn_of_many_jumps(
+    wear: Duration, state: CoupledState[Any], left: int, reporter: Reporter
+) -> None:
     """Warn of a run with very many jumps, and name the setting that reduces them."""
     key = next((key for key in SIZES if getattr(wear.step, key) is not None), None)
     longer = "wear.tolerance" if key is None else f"wear.step.{key}"
@@ -246,12 +248,10 @@ def warn_of_many_jumps(wear: Duration, state: CoupledState, left: int, reporter:
     )
 
 
-def warn_of_worn_cells(
-    case: WearCase, peak: int, stages: list[FaceContact], state: CoupledState, reporter: Reporter
-) -> None:
+def warn_of_worn_cells(case: WearCase, peak: int, faces: WornFaces, reporter: Reporter) -> None:
     """Warn of worn contacts that carry the peak load on few cells."""
-    for stage, interface in zip(stages, state.interfaces, strict=True):
-        if peak in interface.starts:
-            pressure = interface.starts[peak].pressure
+    for stage, state in faces:
+        if peak in state.starts:
+            pressure = state.starts[peak].pressure
             settings = case.contact_of(stage.name)
             check_cells(stage.name, settings, stage.grid, pressure, reporter, worn=True)

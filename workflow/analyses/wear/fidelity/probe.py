@@ -14,7 +14,6 @@ import numpy as np
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
 from sa_solver.types import ElasticPair, Grid, LoadHistory, resultant_change
-from wear.contact.contacts import Contacts
 from wear.contact.tractions import acting_slip
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.marching import advance_cycles
@@ -84,10 +83,9 @@ def coupled_wear(case: DovetailCase) -> tuple[Numbers, float]:
     """
     structure = _structure(case)
     probed = probe_run(case, structure, "every")
-    first, end = probed.states[0], probed.states[-1]
     sizes = np.array([contact.grid.size for contact in probed.contacts])
-    drifted = structure.probe(Contacts(probed.contacts).nodal_depths(end.interfaces))
-    drift = resultant_change(drifted, first.solved_resultants, sizes)
+    drifted = structure.probe(probed.nodal_depths)
+    drift = resultant_change(drifted, probed.states[0].solved_resultants, sizes)
     return probed.worn, float(np.abs(drift).max())
 
 

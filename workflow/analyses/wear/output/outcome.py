@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from wear.steps.step_errors import step_errors
 from wear.steps.stepping import ContactFailure
 from wear.steps.stick_border import border_errors
 from workflow.analyses.wear.case.base import WearCase
-from workflow.models.contact import ContactEnd, FaceContact
+from workflow.models.contact import ContactEnd, FaceContact, FaceState
 from workflow.models.loads import LoadSource
 
 # Order of convergence of the pressure at worn edges in the length of forward and backward (Strang)
@@ -37,19 +38,18 @@ class InterfaceOutcome:
 
     ``unworn`` are its loads before wear and ``first`` the contact of that cycle. ``state`` has its
     surfaces at the end, and ``reported`` returns a cycle on them. ``kinetics`` ``(j, 5)`` are those
-    at
-    ``cycles`` ``(j,)``. ``finer`` returns both cycles in twice as many increments, or None where
+    at ``cycles`` ``(j,)``. ``finer`` returns both cycles in twice as many increments, or None where
     the loads between increments are unknown.
     """
 
     stage: FaceContact
     unworn: FaceLoads
     first: FirstContact
-    state: InterfaceState
+    state: FaceState
     reported: Callable[[], ContactEnd]
     cycles: Array
     kinetics: Array
-    finer: Callable[[InterfaceState], list[CycleTractions] | None] = lambda _: None
+    finer: Callable[[Any], list[CycleTractions] | None] = lambda _: None
 
     @cached_property
     def regimes(self) -> dict[str, LinearRegime | None]:
@@ -82,9 +82,10 @@ class InterfaceOutcome:
         still = [t for t in np.flatnonzero(self.state.loads.P > 0.0) if t not in starts]
         if still and self.stage.settings.drive.presses:
             worn[still] = self.end.pressure[still]  # where nothing has worn
+        drive, grid = self.stage.settings.drive, self.stage.grid
         return {
-            "unworn": self.stage.carried(self.unworn.loads, self.first.pressure),
-            "worn": self.stage.carried(self.state.loads, worn),
+            "unworn": drive.carried(grid, self.unworn.loads, self.first.pressure),
+            "worn": drive.carried(grid, self.state.loads, worn),
         }
 
     @property
@@ -110,7 +111,8 @@ class InterfaceOutcome:
         (:func:`peak_change`), divided by 2^p - 1 with p = :data:`AT_EDGES`. Implicit steps over
         increments in turn have errors of first order, so that their change is not divided.
         """
-        left, other = step_errors(self.state, self.stage.areas), self.ended.pressure_of_coarse_run
+        left = step_errors(self.state, self.stage.contact.areas)
+        other = self.ended.pressure_of_coarse_run
         if left is None or other is None:
             return None
         change = peak_change(self.end.pressure, other, at_rest=not len(self.state.paths))
@@ -137,16 +139,18 @@ class InterfaceOutcome:
 
         It exists for a half-space with its own friction solution; None if it is unknown.
         """
-        contact, cycles = self.stage.wearing(self.state), float(self.cycles[-1])
+        state, cycles = self.state, float(self.cycles[-1])
+        assert isinstance(state, InterfaceState)
+        contact = self.stage.contact.wearing(state)
         try:
-            return border_errors(contact, self.state, (self.begin, self.end), cycles)
+            return border_errors(contact, state, (self.begin, self.end), cycles)
         except ContactFailure:
             return None
 
     @cached_property
     def begin(self) -> CycleTractions:
         """Tractions of the unworn cycle."""
-        return self.stage.unworn_tractions(self.unworn, self.first)
+        return self.stage.contact.unworn_tractions(self.unworn, self.first)
 
     @cached_property
     def end(self) -> CycleTractions:
@@ -183,5 +187,5 @@ class Outcome:
 
     case: WearCase
     source: LoadSource
-    state: CoupledState
+    state: CoupledState[Any]
     interfaces: list[InterfaceOutcome]

@@ -92,13 +92,11 @@ def write_output(outcome: Outcome, probe_results: ProbeResults, run: Run[WearCas
     """
     case, source, state = outcome.case, outcome.source, outcome.state
     folder, reporter = run.folder, run.reporter
-    stages = [contact.stage for contact in outcome.interfaces]
+    faces = [(contact.stage, contact.state) for contact in outcome.interfaces]
     structure = None
     if isinstance(source, StructureLoads):
         moves = case.output.paraview
-        structure = worn_structure(
-            source, stages, state, case.friction_evolves, moves, folder, reporter
-        )
+        structure = worn_structure(source, faces, case.friction_evolves, moves, folder, reporter)
         structure.warn(case.accuracy, reporter)
     with reporter.stage("stress under the contacts", "steps") as reported:
         stresses = _stresses(outcome, structure, reporter, reported)
@@ -106,13 +104,13 @@ def write_output(outcome: Outcome, probe_results: ProbeResults, run: Run[WearCas
     with reporter.stage("results"):
         recorded, contents, measured = _write_results(outcome, structure, stresses, budget, run)
     run.draw(contents)
-    worn_nodes = write_worn_faces(source, stages, state.interfaces, folder, reporter)
+    worn_nodes = write_worn_faces(source, faces, folder, reporter)
     loops = write_loop_tables(folder, measured, source.line)
     warn_of_border(loops, case.loops, reporter)
     drift = float(state.drift.max(initial=0.0))
     warn_of_errors(case, outcome.interfaces, budget, drift, reporter)
     summary = _summary(outcome, structure, stresses, budget, recorded)
-    uniform = uniformities(source, stages, state.interfaces)
+    uniform = uniformities(source, faces)
     uniformity = {name: vars(alike) for name, alike in uniform.items()}
     further = {"worn_nodes": worn_nodes, "loops": loops, "uniformity": uniformity}
     for key, by_interface in further.items():

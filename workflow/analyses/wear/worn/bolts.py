@@ -9,8 +9,8 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
-from wear.coupled_state import CoupledState
 from workflow.layout.declared import Arrays
+from workflow.models.contact import WornFaces
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
 from workflow.shell.output.results import ResultsWriter
@@ -19,11 +19,11 @@ from workflow.shell.output.results import ResultsWriter
 BOLTS, TENSION = "bolts", "bolts/tension"
 
 
-def stored_tensions(source: LoadSource, state: CoupledState) -> dict[str, Array]:
-    """Return the tensions ``(bolts, t)`` of a state under its last solved loads, by dataset."""
+def stored_tensions(source: LoadSource, faces: WornFaces) -> dict[str, Array]:
+    """Return the tensions ``(bolts, t)`` under the last solved loads of all faces, by dataset."""
     if not isinstance(source, StructureLoads) or not source.bolts:
         return {}
-    return {TENSION: source.tensions([interface.loads for interface in state.interfaces])}
+    return {TENSION: source.tensions([state.loads for _, state in faces])}
 
 
 class BoltTensions:

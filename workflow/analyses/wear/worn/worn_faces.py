@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from wear.contact.interface import InterfaceState
 from workflow.analyses.wear.worn.worn_nodes import (
     NodalDepths,
     nodal_depths,
@@ -16,7 +14,7 @@ from workflow.analyses.wear.worn.worn_nodes import (
     write_worn_nodes,
 )
 from workflow.case.text.readable import percent
-from workflow.models.contact import FaceContact
+from workflow.models.contact import FaceContact, FaceState, WornFaces
 from workflow.models.loads import LoadSource, UserFace
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.terminal.reporter import Reporter
@@ -26,15 +24,11 @@ FULL_SHARE = 0.99
 
 
 def write_worn_faces(
-    source: LoadSource,
-    stages: Sequence[FaceContact],
-    states: Sequence[InterfaceState],
-    folder: OutputFolder,
-    reporter: Reporter,
+    source: LoadSource, faces: WornFaces, folder: OutputFolder, reporter: Reporter
 ) -> dict[str, dict[str, Any]]:
     """Write the wear at the user's nodes, if there are any; return its summary by interface."""
     summary: dict[str, dict[str, Any]] = {}
-    for number, (stage, state) in enumerate(zip(stages, states, strict=True)):
+    for number, (stage, state) in enumerate(faces):
         for face in source.user_faces(number):
             name = f"worn_nodes_{stage.name}_body_{face.body}.csv"
             what = f"what the nodes of body {face.body} lose at {stage.name}, as displacements"
@@ -56,12 +50,12 @@ def write_worn_faces(
     return summary
 
 
-def _worn_nodes(face: UserFace, stage: FaceContact, state: InterfaceState) -> NodalDepths:
+def _worn_nodes(face: UserFace, stage: FaceContact, state: FaceState) -> NodalDepths:
     """Return the worn depth at the user's nodes, on the contact face or at separate points."""
     depth = stage.on_grid(state).depths[face.body - 1]
     if face.points is not None:
         return nodal_depths(face.points, face.frame, stage.grid, depth)
     nodal = stage.depths_of_bodies(state)[face.body - 1]
-    worn = NodalDepths.of(nodal, stage.face_of(face.body).facet_shares, stage.grid, depth)
+    worn = NodalDepths.of(nodal, stage.face.face(face.body).facet_shares, stage.grid, depth)
     # The meshed nodes come first among those of a whole face.
     return replace(worn, depth=worn.depth[: len(face.numbers)])

@@ -29,7 +29,7 @@ from workflow.analyses.wear.structures.resultants.writing import put_closure
 from workflow.analyses.wear.worn.bolts import BoltTensions
 from workflow.case.text.readable import percent
 from workflow.layout.declared import Arrays
-from workflow.models.contact import FaceContact
+from workflow.models.contact import WornFaces
 from workflow.models.structure import StructureLoads
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.store import replacing
@@ -41,7 +41,6 @@ FORCES = ("P", "Qx", "Qy")
 # Results of a total Lagrangian check in the summary, in addition to the resultants.
 MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_rotation")
 
-GLOBAL_STRESS = "stress xx, yy, zz, xy, yz, zx of the global axes"
 # Largest number of increments shown: enough for smooth motion, few enough to store.
 MOST_INCREMENTS = 48
 
@@ -270,8 +269,7 @@ def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> Array
 
 def worn_structure(
     stage: StructureLoads,
-    contacts: list[FaceContact],
-    state: CoupledState,
+    faces: WornFaces,
     evolves: bool,
     moves: bool,
     folder: OutputFolder,
@@ -282,15 +280,14 @@ def worn_structure(
     If friction ``evolves``, each contact has its coefficient at the end. If the structure
     ``moves``, the surfaces of all bodies over the increments are included.
     """
-    pairs = list(zip(contacts, state.interfaces, strict=True))
-    depths = [contact.depths_of_bodies(interface) for contact, interface in pairs]
+    depths = [contact.depths_of_bodies(state) for contact, state in faces]
     meshed = list(map(meshed_depths, stage.mesh.interfaces, depths))
     # The friction solution uses one thread and represents worn faces by their gaps.
     worn = begun(partial(stage.worn_mesh, meshed))
     with reported_stage(reporter, stage, "structural friction", "increments"):
         cycle = stage.worn_cycle(
-            [contact.nodal_depth(interface) for contact, interface in pairs],
-            [contact.settings.friction(interface.energy) for contact, interface in pairs]
+            [contact.contact.at_nodes(state.surfaces.depth) for contact, state in faces],
+            [contact.settings.friction(state.energy) for contact, state in faces]
             if evolves
             else None,
         )
@@ -304,8 +301,8 @@ def worn_structure(
     with reporter.stage("stress", "steps") as reported:
         done = Tally(reported, 2 * steps(len(mesh.bodies)))
         shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
-        states = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
-        stresses = stage.stresses(states, shown, done)
+        cycles = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
+        stresses = stage.stresses(cycles, shown, done)
     return WornStructure(stage, mesh, cycle, stresses, written, shown)
 
 

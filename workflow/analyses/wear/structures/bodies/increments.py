@@ -19,7 +19,7 @@ from sa_solver.cycles.history import MOST_INCREMENTS, NO_ENERGY
 from sa_solver.cycles.increments import depth_and_energy
 from sa_solver.rigid_modes import PLANAR
 from sa_solver.types import Array
-from wear.contact.interface import InterfaceState
+from wear.contact.interface import InterfaceContact, InterfaceState
 from wear.contact.tractions import CycleTractions
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.contact.load_path import Leg, LineLeg
@@ -29,7 +29,6 @@ from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.changing import changed
 from workflow.case.text.readable import percent
-from workflow.models.contact import FaceContact
 
 AnyCase = TypeVar("AnyCase", bound=TwoBodiesWearCase)
 
@@ -73,16 +72,16 @@ def finer_cycles(case: TwoBodiesWearCase, state: InterfaceState) -> list[CycleTr
 
     Raises ContactFailure.
     """
-    stage, loads = _staged(case, 2)
-    unworn, first = stage.begin(loads, case.wear.cycles)
+    contact, loads = _contact(case, 2)
+    unworn, first = contact.begin(loads, case.wear.cycles)
     worn = replace(unworn, surfaces=state.surfaces, energy=state.energy, starts={}, start=None)
-    return [stage.unworn_tractions(loads, first), stage.tractions(worn)]
+    return [contact.unworn_tractions(loads, first), contact.tractions(worn)]
 
 
-def _staged(case: TwoBodiesWearCase, parts: int) -> tuple[FaceContact, Any]:
+def _contact(case: TwoBodiesWearCase, parts: int) -> tuple[InterfaceContact, Any]:
     source = BodiesSource(case, parts)
     (face,), (loads,) = source.faces, source.unworn()
-    return face_contact(case, face), loads
+    return face_contact(case, face).contact, loads
 
 
 def _cycle(case: TwoBodiesWearCase, parts: int) -> tuple[Array, float] | None:
@@ -90,19 +89,19 @@ def _cycle(case: TwoBodiesWearCase, parts: int) -> tuple[Array, float] | None:
 
     The second value sums the absolute work of all increments [N mm], per area of a cell.
     """
-    stage, loads = _staged(case, parts)
+    contact, loads = _contact(case, parts)
     try:
-        _, first = stage.begin(loads, case.wear.cycles)
+        _, first = contact.begin(loads, case.wear.cycles)
     except ContactFailure:
         return None
-    work = stage.unworn_tractions(loads, first).work.sum(axis=0)
+    work = contact.unworn_tractions(loads, first).work.sum(axis=0)
     planar = list(PLANAR)
     forces, motions = (
         np.array([getattr(state, name)[planar] for state in first.cycle])
         for name in ("resultants", "rigid")
     )
     moved = np.abs(np.sum(forces * (motions - np.roll(motions, 1, axis=0)), axis=1)).sum()
-    return work, float(moved) / stage.grid.cell_area
+    return work, float(moved) / contact.grid.cell_area
 
 
 def _change(coarse: tuple[Array, float] | None, fine: tuple[Array, float] | None) -> float:
