@@ -1,5 +1,6 @@
 """Tests of vibration models that are built and run in Python."""
 
+import warnings
 from dataclasses import replace
 
 import fretscale
@@ -9,6 +10,7 @@ import pytest
 from fe_models.dynamics import Accuracy, Link, Resolution, lumped_rig
 from tests.conftest import CASES
 from wear.joints import Jenkins
+from workflow.models.vibration.results import LARGEST_ERROR
 
 MASS, SPRING, RATIO = 1e-3, 1e3, 0.01
 
@@ -53,6 +55,21 @@ def test_a_curve_without_resonance_gives_a_warning(model):
     below = replace(model, sweep=fretscale.FrequencySweep(100.0, 120.0))
     with pytest.warns(fretscale.ModelWarning, match=r"0\.1 N"):
         below.run()
+
+
+def test_motions_less_accurate_than_asked_for_give_a_warning(model):
+    """The third harmonic of a sliding joint is neither computed nor allowed here."""
+    few = replace(model, forces=(100.0,), resolution=Resolution((1,), 64))
+
+    def within(tolerance):
+        return replace(model.sweep, accuracy=Accuracy(tolerance, highest=1, most_samples=64))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        error = replace(few, sweep=within(0.5)).run()["100 N"].attrs["error"]
+    assert 1e-4 < error < LARGEST_ERROR
+    with pytest.warns(fretscale.ModelWarning, match="100 N"):
+        replace(few, sweep=within(0.5 * error)).run()
 
 
 def test_a_model_vibrates_as_its_case(tmp_path):

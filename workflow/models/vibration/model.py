@@ -110,7 +110,8 @@ class VibrationModel:
         Warns
         -----
         ModelWarning
-            A curve ends before the span does, has no resonance, or has a large error.
+            A curve ends before the span does, has no resonance, or has an error above the accuracy
+            of the sweep, or above 5 % without one.
 
         Raises
         ------
@@ -122,6 +123,6 @@ class VibrationModel:
             name = self.structure.driving.amount.as_text(force)
             with observed(observers, name):
                 responses[name] = self.response(force, steps)
-            for message in responses[name].faults():
+            for message in responses[name].faults(self.sweep.accuracy):
                 warnings.warn(f"{name}: {message}", ModelWarning, stacklevel=2)
         return VibrationResults(self.structure, self.sweep.span, responses).tree()
