@@ -47,3 +47,21 @@ def test_a_sliding_joint_dissipates_what_its_force_moves(model):
 def test_long_steps_give_a_warning(model):
     with pytest.warns(fretscale.ModelWarning, match="time steps"):
         replace(model, control=TimeStepControl(2e-3)).run()
+
+
+class Shares(fretscale.Observer):
+    """Observer that collects what is reported as done."""
+
+    def __init__(self):
+        self.shares = []
+
+    def reached(self, share):
+        self.shares.append(share)
+
+
+def test_observers_follow_a_motion_to_its_end(model, capsys):
+    watching = Shares()
+    model.run([watching, fretscale.Progress()])
+    assert watching.shares == sorted(watching.shares)
+    assert watching.shares[-1] == pytest.approx(1.0)
+    assert capsys.readouterr().err.splitlines()[-1] == "100 %"

@@ -51,6 +51,25 @@ def test_a_sliding_joint_is_a_coulomb_damper(model):
     assert response.attrs["amplitude"] == pytest.approx(expected, rel=1e-3)
 
 
+class Shares(fretscale.Observer):
+    """Observer that collects what is reported as done."""
+
+    def __init__(self):
+        self.shares = []
+
+    def reached(self, share):
+        self.shares.append(share)
+
+
+@pytest.mark.parametrize("upward", [True, False])
+def test_observers_follow_a_curve_to_its_end(model, upward):
+    watching = Shares()
+    replace(model, sweep=replace(model.sweep, upward=upward)).run([watching])
+    assert watching.shares == sorted(watching.shares)
+    assert 0.0 < watching.shares[0] < 0.5
+    assert watching.shares[-1] == pytest.approx(1.0)
+
+
 def test_a_curve_without_resonance_gives_a_warning(model):
     below = replace(model, sweep=fretscale.FrequencySweep(100.0, 120.0))
     with pytest.warns(fretscale.ModelWarning, match=r"0\.1 N"):

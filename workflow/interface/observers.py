@@ -18,10 +18,14 @@ from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
 
 # Name of the array that holds the packed state.
 STATE = "state"
+# Added to shares, of which the last one may be below 1 by rounding.
+ROUNDING = 1e-6
 
 
 class Progress(Observer):
     """Observer that prints a line for each part of a run, and one after every jump.
+
+    Curves of vibrations and motions in time print a line for every tenth that is computed.
 
     Parameters
     ----------
@@ -37,12 +41,19 @@ class Progress(Observer):
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream
+        self._tenths = 0
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
+        self._tenths = 0
         if name != "drift probe":
             self._print(name)
         yield
+
+    def reached(self, share: float) -> None:
+        if (tenths := int(10.0 * share + ROUNDING)) > self._tenths:
+            self._tenths = tenths
+            self._print(f"{10 * tenths} %")
 
     def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
         self._print(
