@@ -104,7 +104,8 @@ class MotionModel:
             Entered for the motion, and called with the share of it that is done, such as
             :class:`fretscale.Progress`.
         steps : Steps
-            Runner of the steps, which may store them so that an interrupted run can resume.
+            Runner of the steps. :meth:`fretscale.Checkpoint.steps` stores them, so that an
+            interrupted run can resume.
 
         Returns
         -------

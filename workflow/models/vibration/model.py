@@ -110,7 +110,8 @@ class VibrationModel:
             Entered for each curve, and called after its points, such as
             :class:`fretscale.Progress`.
         steps : Steps
-            Runner of the steps, which may store them so that an interrupted run can resume.
+            Runner of the steps. :meth:`fretscale.Checkpoint.steps` stores them, so that an
+            interrupted run can resume.
 
         Returns
         -------
