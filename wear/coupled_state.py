@@ -104,6 +104,9 @@ class Observer:
     def remaining(self, state: CoupledState[Any], jumps: int) -> None:
         """Handle the estimated number of ``jumps`` from ``state`` on, which is worn already."""
 
+    def reached(self, share: float) -> None:
+        """Handle that about this ``share`` of a curve, or of a motion in time, is computed."""
+
 
 @contextmanager
 def observed(observers: Sequence[Observer], name: str) -> Iterator[None]:

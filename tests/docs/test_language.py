@@ -11,7 +11,9 @@ PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts
 LONGEST_SENTENCE, LONGEST_PAGE = 35, 2000
 # Starts whose meaning depends on an earlier sentence, or comes later in the same one.
 UNCLEAR = re.compile(r"(That|Those|What|Whether|Of) ")
-BLOCK = re.compile(r"^---$.*?^---$|^(```|~~~).*?^\1|^\$\$.*?^\$\$|^<[^>]+>", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(
+    r"^---$.*?^---$|^(```|~~~).*?^\1|^\$\$.*?^\$\$|^<[^>]+>", re.MULTILINE | re.DOTALL
+)
 LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
 NOT_PROSE = re.compile(r"^\s*(\||#|%|\(|\{|:|!\[)")
 

@@ -5,9 +5,11 @@ from dataclasses import replace
 import fretscale
 import numpy as np
 import pytest
+import xarray
 
 from fe_models.dynamics import HarmonicForce, Link, TimeStepControl, lumped_rig
 from wear.joints import Jenkins
+from workflow.shell.folders import steps
 
 MASS, SPRING, FORCE, FREQUENCY = 1e-3, 1e3, 10.0, 50.0
 
@@ -47,3 +49,51 @@ def test_a_sliding_joint_dissipates_what_its_force_moves(model):
 def test_long_steps_give_a_warning(model):
     with pytest.warns(fretscale.ModelWarning, match="time steps"):
         replace(model, control=TimeStepControl(2e-3)).run()
+
+
+class Counted(HarmonicForce):
+    """Force that counts how often it is evaluated, and interrupts the run after so many times."""
+
+    count, most = 0, np.inf
+
+    def value(self, times):
+        type(self).count += 1
+        if self.count > self.most:
+            raise KeyboardInterrupt
+        return super().value(times)
+
+
+def test_an_interrupted_motion_goes_on_from_its_checkpoint(model, tmp_path, monkeypatch):
+    monkeypatch.setattr(steps, "SHARE", np.inf)  # every step is saved
+    checkpoint = fretscale.Checkpoint(tmp_path / "motion.h5")
+    force = Counted(model.rig.driven, FORCE, FREQUENCY)
+    counted = replace(model, force=force, control=TimeStepControl(5e-6))
+    whole, work = counted.run(), Counted.count
+    monkeypatch.setattr(Counted, "count", 0)
+    monkeypatch.setattr(Counted, "most", int(0.75 * work))
+    with pytest.raises(KeyboardInterrupt):
+        counted.run(steps=checkpoint.steps(counted))
+    monkeypatch.setattr(Counted, "count", 0)
+    xarray.testing.assert_identical(counted.run(steps=checkpoint.steps(counted)), whole)
+    assert Counted.count < 0.7 * work
+    other = replace(counted, law=replace(counted.law, stiffness=1.01 * SPRING))
+    with pytest.raises(fretscale.UserError, match="another model"):
+        checkpoint.steps(other)
+
+
+class Shares(fretscale.Observer):
+    """Observer that collects what is reported as done."""
+
+    def __init__(self):
+        self.shares = []
+
+    def reached(self, share):
+        self.shares.append(share)
+
+
+def test_observers_follow_a_motion_to_its_end(model, capsys):
+    watching = Shares()
+    model.run([watching, fretscale.Progress()])
+    assert watching.shares == sorted(watching.shares)
+    assert watching.shares[-1] == pytest.approx(1.0)
+    assert capsys.readouterr().err.splitlines()[-1] == "100 %"

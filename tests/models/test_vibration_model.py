@@ -1,14 +1,18 @@
 """Tests of vibration models that are built and run in Python."""
 
+import warnings
 from dataclasses import replace
 
 import fretscale
 import numpy as np
 import pytest
+import xarray
 
-from fe_models.dynamics import Accuracy, Link, Resolution, lumped_rig
+from fe_models.dynamics import Accuracy, HarmonicBalance, Link, Resolution, lumped_rig
 from tests.conftest import CASES
 from wear.joints import Jenkins
+from workflow.models.vibration.results import LARGEST_ERROR
+from workflow.shell.folders import steps
 
 MASS, SPRING, RATIO = 1e-3, 1e3, 0.01
 
@@ -49,10 +53,75 @@ def test_a_sliding_joint_is_a_coulomb_damper(model):
     assert response.attrs["amplitude"] == pytest.approx(expected, rel=1e-3)
 
 
+class Shares(fretscale.Observer):
+    """Observer that collects what is reported as done."""
+
+    def __init__(self):
+        self.shares = []
+
+    def reached(self, share):
+        self.shares.append(share)
+
+
+@pytest.mark.parametrize("upward", [True, False])
+def test_observers_follow_a_curve_to_its_end(model, upward):
+    watching = Shares()
+    replace(model, sweep=replace(model.sweep, upward=upward)).run([watching])
+    assert watching.shares == sorted(watching.shares)
+    assert 0.0 < watching.shares[0] < 0.5
+    assert watching.shares[-1] == pytest.approx(1.0)
+
+
+class Interrupted(Shares):
+    """Observer that interrupts a curve half-way."""
+
+    def reached(self, share):
+        super().reached(share)
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+
+def test_an_interrupted_curve_goes_on_from_its_checkpoint(model, tmp_path, monkeypatch):
+    monkeypatch.setattr(steps, "SHARE", np.inf)  # every step is saved
+    checkpoint, evaluated = fretscale.Checkpoint(tmp_path / "curve.h5"), []
+    evaluate = HarmonicBalance.evaluate
+
+    def counted(balance, *arguments):
+        evaluated.append(1)
+        return evaluate(balance, *arguments)
+
+    monkeypatch.setattr(HarmonicBalance, "evaluate", counted)
+    whole, work = model.run(), len(evaluated)
+    with pytest.raises(KeyboardInterrupt):
+        model.run([Interrupted()], checkpoint.steps(model))
+    assert len(evaluated) > work
+    xarray.testing.assert_identical(model.run(steps=checkpoint.steps(model)), whole)
+    assert len(evaluated) == 2 * work  # no point was found again
+    rougher = replace(model.law, friction=0.6)
+    for wrong in (replace(model, forces=(0.2,)), replace(model, law=rougher)):
+        with pytest.raises(fretscale.UserError, match="another model"):
+            checkpoint.steps(wrong)
+
+
 def test_a_curve_without_resonance_gives_a_warning(model):
     below = replace(model, sweep=fretscale.FrequencySweep(100.0, 120.0))
     with pytest.warns(fretscale.ModelWarning, match=r"0\.1 N"):
         below.run()
+
+
+def test_motions_less_accurate_than_asked_for_give_a_warning(model):
+    """The third harmonic of a sliding joint is neither computed nor allowed here."""
+    few = replace(model, forces=(100.0,), resolution=Resolution((1,), 64))
+
+    def within(tolerance):
+        return replace(model.sweep, accuracy=Accuracy(tolerance, highest=1, most_samples=64))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        error = replace(few, sweep=within(0.5)).run()["100 N"].attrs["error"]
+    assert 1e-4 < error < LARGEST_ERROR
+    with pytest.warns(fretscale.ModelWarning, match="100 N"):
+        replace(few, sweep=within(0.5 * error)).run()
 
 
 def test_a_model_vibrates_as_its_case(tmp_path):

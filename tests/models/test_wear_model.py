@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
 
 import fretscale
@@ -63,8 +64,6 @@ def test_a_model_wears_as_its_case(tmp_path, monkeypatch):
         error_budget="known",
         output__paraview=False,
         output__figures=False,
-        stress__section="none",
-        stress__life__parameter="none",
     )
     written = fretscale.run(case, tmp_path / "out", quiet=True)
     results = wear_model(case).run()
@@ -74,6 +73,69 @@ def test_a_model_wears_as_its_case(tmp_path, monkeypatch):
         assert results[flank]["volume_2"].values.tolist() == kinetics["volume_2"]
         surfaces = written[f"surfaces/{flank}"].xarray()["body_1"]
         np.testing.assert_array_equal(results[flank]["depth_1"].values, -surfaces.values)
+    same_stress(results, written)
+
+
+def same_stress(results, written):
+    """Check that a model has the stress of the run of its case, bit for bit."""
+    for flank in ("intrados", "extrados"):
+        for kind in ("section", "life"):
+            found = results[flank][kind]
+            for name in found.data_vars:
+                for state, moment in enumerate(found["state"].values):
+                    for body, number in enumerate(found["body"].values):
+                        path = f"stress/{kind}/{flank}/{moment}/body_{number}/{name}"
+                        np.testing.assert_array_equal(found[name][state, body], written[path])
+    peaks = written.summary["structure"]["peak_stress"]
+    for body in ("disk", "blade"):
+        found = results[f"bodies/{body}"]
+        for state, moment in enumerate(found["state"].values):
+            for name in ("points", "displacement", "stress", "von_mises", "maximum_principal"):
+                expected = written[f"bodies/{body}/{moment}/{name}"]
+                np.testing.assert_array_equal(found[name][state], expected)
+            notch = peaks[moment][body]["notch"]
+            assert found["notch_stress"].values[state] == notch["von_mises"]
+            assert found["notch_error"].values[state] == notch["error"]
+
+
+def test_a_plane_joint_has_the_stress_of_its_case(tmp_path, monkeypatch):
+    monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
+    case = fretscale.load_case(
+        CASES / "dovetail_2d.yaml",
+        mesh__flank_nodes=[10, 10],
+        mesh__size=8.0,
+        contact__grid=48,
+        load_path__increments=[3, 5],
+        wear__cycles=1e4,
+        error_budget="known",
+        output__paraview=False,
+        output__figures=False,
+    )
+    written = fretscale.run(case, tmp_path / "out", quiet=True)
+    same_stress(wear_model(case).run(), written)
+
+
+def test_stress_under_a_contact_balances_its_loads(model):
+    """The section carries the force, and the work of Ruiz is that of friction in a cycle."""
+    stress = fretscale.Stress(depth=0.5, points=4, critical_distance=0.01)
+    face = replace(model, stress=stress).run()["pad"]
+    cell = 1.4 / 70
+    friction = face["life"]["friction_parameter"].sum(("x", "y")) * cell
+    # F1 is a quarter of the work: friction 0.5 times 50 N/mm over 2 x 40 um.
+    np.testing.assert_allclose(friction, 0.25 * 0.5 * 50.0 * 0.08, rtol=1e-7)
+    carried = (
+        face["section"]["stress"].sel(stress_component="zz").isel(depths=0).sum("along") * cell
+    )
+    np.testing.assert_allclose(carried, -50.0, rtol=1e-2)  # some of it beside the grid
+    assert "bodies" not in face
+
+
+def test_a_section_beside_the_grid_is_refused(model):
+    for wrong in (fretscale.Stress(at=2.0), fretscale.Stress("y")):
+        with pytest.raises(InputError, match=r"stress\."):
+            replace(model, stress=wrong).run()
+    with pytest.raises(InputError, match="depth"):
+        fretscale.Stress(depth=0.01)
 
 
 def test_own_loads_wear_by_archard():

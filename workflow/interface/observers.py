@@ -7,21 +7,30 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
+from sa_solver.steps import Steps
 from wear.coupled_state import CoupledState, Observer
 from workflow.errors import UserError
 from workflow.shell.folders.packing import PackingError, packed, unpacked
 from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
 
+if TYPE_CHECKING:
+    from workflow.models.rig.motion import MotionModel
+    from workflow.models.vibration.model import VibrationModel
+
 # Name of the array that holds the packed state.
 STATE = "state"
+# Added to shares, of which the last one may be below 1 by rounding.
+ROUNDING = 1e-6
 
 
 class Progress(Observer):
     """Observer that prints a line for each part of a run, and one after every jump.
+
+    Curves of vibrations and motions in time print a line for every tenth that is computed.
 
     Parameters
     ----------
@@ -37,12 +46,19 @@ class Progress(Observer):
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream
+        self._tenths = 0
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
+        self._tenths = 0
         if name != "drift probe":
             self._print(name)
         yield
+
+    def reached(self, share: float) -> None:
+        if (tenths := int(10.0 * share + ROUNDING)) > self._tenths:
+            self._tenths = tenths
+            self._print(f"{10 * tenths} %")
 
     def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
         self._print(
@@ -56,6 +72,10 @@ class Progress(Observer):
 
 class Checkpoint(Observer):
     """Observer that writes the state of a run to a file after every jump, to resume from it.
+
+    Vibrations and motions in time have no jumps. Their steps are stored as often as half a percent
+    of the time allows, where :meth:`steps` runs them; a second run takes them from the file:
+    ``model.run(steps=checkpoint.steps(model))``.
 
     Parameters
     ----------
@@ -95,3 +115,13 @@ class Checkpoint(Observer):
         except (KeyError, PackingError) as error:
             raise UserError(f"{self.path}: not a state of this version of fretscale") from error
         return state
+
+    def steps(self, model: VibrationModel | MotionModel) -> Steps:
+        """Return a runner of the steps of a model, which stores them and takes stored ones.
+
+        Raises UserError for a file of another model, or without steps.
+        """
+        # Folders of runs take a second to import, and states of wear need none of them.
+        from workflow.interface.file_steps import FileSteps
+
+        return FileSteps(self.path, model)

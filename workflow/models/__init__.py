@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from workflow.models.loops import TangentialLoops
     from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
+    from workflow.models.stress.settings import Stress
     from workflow.models.structure import StructureLoads
     from workflow.models.structure_model import LoadCycle, Nonlinearity, StructureModel
     from workflow.models.vibration.model import VibrationModel
@@ -39,6 +40,7 @@ __all__ = [
     "MotionModel",
     "Nonlinearity",
     "RigModel",
+    "Stress",
     "StructureLoads",
     "StructureModel",
     "TangentialLoops",

@@ -18,6 +18,7 @@ from wear.surfaces import Surfaces
 from workflow.layout.declared import GRID, Declared, declared
 from workflow.models.contact import FaceContact, FaceState
 from workflow.models.contacts import FaceContacts
+from workflow.models.stress.results import StressResults
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,12 +82,14 @@ class WearResults:
     cycle, ``unworn`` and at the end (``state``). In a ``line`` contact forces, moments, energies
     and volumes are per length. Attributes of a face are the relative errors of depth and volume due
     to the wear steps; what mesh, grid and increments leave is estimated by ``fretscale run`` only.
+    The groups of ``stress`` are added, if there is any.
     """
 
     recorder: ResultsRecorder
     state: CoupledState[Any]
     unworn: Sequence[FaceLoads]
     line: bool
+    stress: StressResults | None = None
 
     def tree(self) -> xr.DataTree:
         """Return the results as a tree of labelled arrays."""
@@ -102,7 +105,8 @@ class WearResults:
             coords={"cycles": self._cycles()},
             attrs={"solutions_of_the_loads": self.state.solutions, "per_length": int(self.line)},
         )
-        return xr.DataTree.from_dict({"/": run, **faces})
+        further = {} if self.stress is None else self.stress.groups()
+        return xr.DataTree.from_dict({"/": run, **faces, **further})
 
     def _face(self, number: int, contact: FaceContact, state: FaceState) -> xr.Dataset:
         """Return the results of one contact face."""

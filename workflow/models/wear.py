@@ -1,4 +1,4 @@
-"""A structure, its contacts and how they wear: the model of a wear analysis."""
+"""A structure, its contacts, how they wear and their stress: the model of a wear analysis."""
 
 from __future__ import annotations
 
@@ -11,16 +11,25 @@ import numpy as np
 
 from fe_models.solvers.blas_threads import one_thread
 from sa_solver.errors import InputError
+from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceContact
 from wear.coupled import CoupledWear
-from wear.coupled_state import CoupledState, Observer
+from wear.coupled_state import CoupledState, Observer, observed
 from wear.schedule import CoupledSettings
 from workflow.errors import ModelWarning
-from workflow.models.contact import Contact, FaceContact, Wear, border_warnings
+from workflow.models.contact import Contact, FaceContact, Wear, WornFaces, border_warnings
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 from workflow.models.nodal import nodal_contacts
 from workflow.models.results import ResultsRecorder, WearResults
+from workflow.models.stress.contact_stress import contact_stresses, cycles_of
+from workflow.models.stress.results import StressResults
+from workflow.models.stress.settings import Stress
+from workflow.models.stress.structure_stress import (
+    StressedStructure,
+    begin_worn_mesh,
+    end_cycle,
+)
 from workflow.models.structure import StructureLoads
 from workflow.models.structure_model import StructureModel, StructureStore
 
@@ -40,6 +49,8 @@ class WearModel:
         One contact for all faces, or one for each face by its name.
     wear : Wear
         Length and steps of the wear.
+    stress : Stress, optional
+        Stress of the bodies and under the contacts, unworn and worn; none unless given.
 
     Examples
     --------
@@ -58,6 +69,7 @@ class WearModel:
     structure: StructureModel | LoadSource
     contacts: Contact | Mapping[str, Contact]
     wear: Wear
+    stress: Stress | None = None
 
     def contact(self, name: str) -> Contact:
         """Return the contact of a face. Raises InputError where the model has none."""
@@ -130,12 +142,14 @@ class WearModel:
         -------
         xarray.DataTree
             A group for each contact face and one of the run, with units and descriptions as
-            attributes.
+            attributes. With ``stress``, faces have groups ``section`` and ``life``, and the bodies
+            of a structure of finite elements have groups in ``bodies``.
 
         Warns
         -----
         ModelWarning
-            A contact touches the border of its grid, or the structure has an obvious fault.
+            A contact touches the border of its grid, the structure has an obvious fault, or its
+            stress is not fully known.
 
         Raises
         ------
@@ -150,6 +164,9 @@ class WearModel:
         with one_thread():
             unworn = loads.unworn()
             contacts = self.face_contacts(loads)
+            if self.stress is not None:
+                for stage in contacts.stages:
+                    self.stress.check(stage.grid)
             recorder = ResultsRecorder(contacts, loads.peak)
             loop = self.loop(loads, contacts, [*observers, recorder])
             state, first = loop.begin(unworn)
@@ -158,7 +175,38 @@ class WearModel:
             if start is not None:
                 check_start(start, state)
                 state = start
-            return WearResults(recorder, loop.run(state), unworn, loads.line).tree()
+            end, found = loop.run(state), None
+            if self.stress is not None:
+                with observed(observers, "stress"):
+                    found = self._stress(self.stress, loads, contacts.faces(end), unworn, first)
+                for message in found.faults(loads.peak):
+                    warnings.warn(message, ModelWarning, stacklevel=2)
+            return WearResults(recorder, end, unworn, loads.line, found).tree()
+
+    def _stress(
+        self,
+        stress: Stress,
+        loads: LoadSource,
+        faces: WornFaces,
+        unworn: Sequence[FaceLoads],
+        first: Sequence[FirstContact],
+    ) -> StressResults:
+        """Return the stress before any wear and on the surfaces at the end."""
+        structure = None
+        if isinstance(loads, StructureLoads):
+            worn = begin_worn_mesh(loads, faces)
+            cycle = end_cycle(loads, faces, self.settings(loads).friction == "evolving")
+            structure = StressedStructure.of(loads, worn(), cycle)
+        if not stress.under_contacts:
+            return StressResults(structure, ())
+        cycles = []
+        for number, ((face, state), begin, found) in enumerate(
+            zip(faces, unworn, first, strict=True)
+        ):
+            contact = face.contact
+            tractions = contact.unworn_tractions(begin, found), contact.tractions(state)
+            cycles.append(cycles_of(face, number, tractions, begin, structure))
+        return StressResults(structure, contact_stresses(stress, loads.peak, cycles))
 
 
 def _warnings(

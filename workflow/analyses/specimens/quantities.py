@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import partial
 
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.analyses.wear.output.layout import MOMENTS
+from workflow.models.stress.layout import MOMENTS
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, reported

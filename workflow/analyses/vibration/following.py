@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.dynamics.curves.curve_steps import ContinuationControl
-from fe_models.dynamics.curves.forced_response import Accuracy
+from fe_models.dynamics.curves.motion_recorder import Accuracy
 from sa_solver.steps import Steps
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.model import accuracy_of, step_control

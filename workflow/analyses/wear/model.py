@@ -12,7 +12,7 @@ from workflow.models.wear import WearModel
 
 
 def wear_model(case: Case) -> WearModel:
-    """Return the model that a case describes: its structure, its contacts and how they wear.
+    """Return the model that a case describes: structure, contacts, wear and stress.
 
     Raises UserError for a case of another kind.
     """
@@ -25,4 +25,5 @@ def wear_model(case: Case) -> WearModel:
     contacts: Contact | dict[str, Contact] = contact_of(case, names[0])
     if len(names) > 1:
         contacts = {name: contact_of(case, name) for name in names}
-    return WearModel(structure_of(case).model(case), contacts, wear_of(case))
+    structure = structure_of(case).model(case)
+    return WearModel(structure, contacts, wear_of(case), case.stress.described())

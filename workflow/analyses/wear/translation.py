@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
+from sa_solver.errors import InputError
 from wear.contact.interface import InterfaceContact
 from wear.schedule import JumpSize, Stop
 from workflow.analyses.wear.case.base import WearCase
@@ -74,14 +75,7 @@ def structure_loads(
 
 def check_section(case: WearCase, face: ContactFace) -> None:
     """Raise UserError for a section of the stress that could not be drawn at the end."""
-    stress, grid = case.stress, face.grid(case.terms(face.face.name).grid)
-    if stress.section == "none":
-        return
-    if stress.section == "y" and grid.line:
-        raise UserError("stress.section: y: a line contact has no length along y; allowed: x, none")
-    reach = 0.5 * grid.size[1 if stress.section == "x" else 0]
-    if abs(stress.at) > reach:
-        raise UserError(
-            f"stress.at: {stress.at:g} mm is outside the contact's grid; allowed: {-reach:.4g} to "
-            f"{reach:.4g} mm"
-        )
+    try:
+        case.stress.described().check(face.grid(case.terms(face.face.name).grid))
+    except InputError as error:
+        raise UserError(str(error)) from error

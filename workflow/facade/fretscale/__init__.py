@@ -15,6 +15,7 @@ Models in Python
     - ``UncoupledSource``, ``LoadSource``: base classes for user-defined loads of ``ContactFace`` s.
     - ``Contact``, ``CoulombFriction``: properties of a contact, and how it is computed.
     - ``Wear``, ``JumpSize``, ``Stop``: how far contacts wear, and in which steps.
+    - ``Stress``: the stress of bodies and under contacts, and fretting life.
     - ``AddedGap``: a profile on top of the form of a face.
     - ``VibrationModel``: a rig with joints under periodic forces; ``run`` computes its motions.
     - ``vibration_model``: the model that a vibration case describes.
@@ -140,6 +141,7 @@ if TYPE_CHECKING:
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
     from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
+    from workflow.models.stress.settings import Stress
     from workflow.models.vibration.model import VibrationModel
     from workflow.models.vibration.sweep import FrequencySweep
     from workflow.models.wear import WearModel
@@ -178,6 +180,7 @@ __all__ = [
     "Results",
     "RigModel",
     "Stop",
+    "Stress",
     "TightenedBolt",
     "UncoupledSource",
     "UserError",

@@ -101,9 +101,11 @@ class MotionModel:
         Parameters
         ----------
         observers : sequence of Observer
-            Entered for the motion, such as :class:`fretscale.Progress`.
+            Entered for the motion, and called with the share of it that is done, such as
+            :class:`fretscale.Progress`.
         steps : Steps
-            Runner of the steps, which may store them so that an interrupted run can resume.
+            Runner of the steps. :meth:`fretscale.Checkpoint.steps` stores them, so that an
+            interrupted run can resume.
 
         Returns
         -------
@@ -124,8 +126,12 @@ class MotionModel:
         """
         import xarray as xr
 
+        def reached(share: float) -> None:
+            for observer in observers:
+                observer.reached(share)
+
         with observed(observers, "motion"):
-            motion = self.motion(steps)
+            motion = self.motion(steps, reached)
         if motion.error > LARGEST_ERROR:
             warnings.warn(
                 f"the time steps cause an error of {motion.error:.1%} of the largest "

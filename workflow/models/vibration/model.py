@@ -82,9 +82,20 @@ class VibrationModel:
         driving = self.driving or Driving.sine(self.rig.driven)
         return VibratingStructure.of(self.rig, self.law, driving, self.resolution, self.normal_load)
 
-    def response(self, force: float, steps: Steps = COMPUTED) -> ForcedResponse:
-        """Return the curve under a force and its resonance."""
-        branch = self.sweep.curve(self.structure, force, steps)
+    def response(
+        self, force: float, steps: Steps = COMPUTED, observers: Sequence[Observer] = ()
+    ) -> ForcedResponse:
+        """Return the curve under a force and its resonance.
+
+        The ``observers`` get the share of the span, on a logarithmic scale, behind each new point.
+        """
+
+        def watch(frequency: float) -> None:
+            share = self.sweep.share(frequency)
+            for observer in observers:
+                observer.reached(share)
+
+        branch = self.sweep.curve(self.structure, force, steps, watch)
         columns = motion_columns(self.structure, branch.problem, branch.solutions)
         amplitudes = columns["amplitude"][:, -1]
         resonance = self.sweep.resonance(self.structure, branch, amplitudes, steps)
@@ -96,9 +107,11 @@ class VibrationModel:
         Parameters
         ----------
         observers : sequence of Observer
-            Entered for each curve, such as :class:`fretscale.Progress`.
+            Entered for each curve, and called after its points, such as
+            :class:`fretscale.Progress`.
         steps : Steps
-            Runner of the steps, which may store them so that an interrupted run can resume.
+            Runner of the steps. :meth:`fretscale.Checkpoint.steps` stores them, so that an
+            interrupted run can resume.
 
         Returns
         -------
@@ -110,7 +123,8 @@ class VibrationModel:
         Warns
         -----
         ModelWarning
-            A curve ends before the span does, has no resonance, or has a large error.
+            A curve ends before the span does, has no resonance, or has an error above the accuracy
+            of the sweep, or above 5 % without one.
 
         Raises
         ------
@@ -121,7 +135,7 @@ class VibrationModel:
         for force in self.forces:
             name = self.structure.driving.amount.as_text(force)
             with observed(observers, name):
-                responses[name] = self.response(force, steps)
-            for message in responses[name].faults():
+                responses[name] = self.response(force, steps, observers)
+            for message in responses[name].faults(self.sweep.accuracy):
                 warnings.warn(f"{name}: {message}", ModelWarning, stacklevel=2)
         return VibrationResults(self.structure, self.sweep.span, responses).tree()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fe_models.dynamics.curves.forced_response import ResponseBranch
+from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
@@ -46,16 +47,25 @@ class ForcedResponse:
         """The equations at the resolution of the resonance."""
         return self.branch.problem.with_resolution(self.resonance.resolution)
 
-    def faults(self) -> Iterator[str]:
-        """Return what makes the curve or its resonance wrong though all solvers converge."""
+    def faults(self, accuracy: Accuracy | None) -> Iterator[str]:
+        """Return what makes the curve or its resonance wrong though all solvers converge.
+
+        Motions are to have the ``accuracy``, or errors below :data:`LARGEST_ERROR` without one.
+        """
         if self.branch.message:
             yield self.branch.message
         if not peaks_inside(self.columns["amplitude"][:, -1]):
             yield "no resonance: the largest motion is at an end of the curve"
-        if self.error > LARGEST_ERROR:
+        if accuracy is None and self.error > LARGEST_ERROR:
             yield (
                 f"the motion has an error of {self.error:.1e}: give an accuracy, or a resolution "
                 "with more harmonics and samples"
+            )
+        if accuracy is not None and self.error > accuracy.tolerance:
+            yield (
+                f"the motion has an error of {self.error:.1e} at the finest resolution, above the "
+                f"tolerance {accuracy.tolerance:g}: allow higher harmonics and more samples in the "
+                "accuracy"
             )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from math import log
 
 from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.forced_response import ResponseBranch, along_frequency
@@ -55,6 +56,11 @@ class FrequencySweep:
     def span(self) -> tuple[float, float]:
         """Both ends [Hz]."""
         return self.lower, self.upper
+
+    def share(self, frequency: float) -> float:
+        """Return the share of the span behind a frequency, on a logarithmic scale."""
+        begin, end = self.span if self.upward else self.span[::-1]
+        return log(frequency / begin) / log(end / begin)
 
     def curve(
         self,

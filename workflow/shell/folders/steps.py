@@ -59,33 +59,27 @@ def resumable_steps(run: Run[Any]) -> Iterator[RunSteps]:
     steps.report()
 
 
-class RunSteps:
-    """Steps of a run that are stored on disk: see :class:`sa_solver.steps.Steps`."""
+class StoredSteps:
+    """Steps whose results are stored: see :class:`sa_solver.steps.Steps`.
 
-    def __init__(self, run: Run[Any]) -> None:
-        self._folder, self._reporter, self._provenance = run.folder, run.reporter, run.provenance
-        self._files = [] if run.kept is None else list(run.kept.jumps)
-        try:
-            self._before = 0 if run.kept is None else int(run.kept.attributes[STEPS])
-            self._marches = {} if run.kept is None else _unjoined(run.kept.arrays)
-        except KeyError as error:
-            raise self._of_another_version(error) from error
-        self._kept = self._of_files()
+    A subclass saves them. ``kept`` are the results of earlier steps, and ``marches`` the states
+    that marches have reached.
+    """
+
+    def __init__(self, kept: dict[Place, bytes], marches: dict[Place, bytes]) -> None:
+        self._kept, self._marches = kept, marches
         # Results that are not saved yet, in the order of their steps.
         self._new: dict[Place, bytes] = {}
         self._above: Place = ()
         self._count = self._computed = 0
-        self._going_on = False
         self._saved, self._cost = time.perf_counter(), FIRST_SAVE
-        if run.kept is not None:
-            run.reporter.say(f"  continues after {counted(self._before, 'step')}")
 
     def __call__(self, name: str, step: Callable[[], T]) -> T:
         place = self._next()
         if place in self._kept:
             value: T = self._read(self._kept.pop(place), name)
             return value
-        warned = len(self._reporter.warnings)
+        warned = len(self._warnings())
         self._compute()
         with self._inside(place):
             value = step()
@@ -96,7 +90,7 @@ class RunSteps:
         if place in self._kept:
             last: T = self._read(self._kept.pop(place), name)
             return last
-        warned, marches = len(self._reporter.warnings), self._marches
+        warned, marches = len(self._warnings()), self._marches
         for begun in [begun for begun in marches if begun[:-1] == place]:
             number, state = begun[-1], self._read(marches[begun], name)
         while True:
@@ -108,35 +102,34 @@ class RunSteps:
             number += 1
             state = self._keep(marches, (*place, number), name, following, warned)
 
-    def record(self, number: int, arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> None:
-        """Write the file of this ``number``, in place of later ones that an interruption left."""
-        digest = write_arrays(self._folder.jump(number), arrays, attributes)
-        self._files[number:] = [digest]
-
-    def report(self) -> None:
-        """Log how many steps this process has computed."""
-        self._reporter.log(f"steps: {self._computed} computed, {self._before} resumed")
-
     def save(self) -> None:
-        """Save the results that are not on disk yet."""
-        if not self._new and not self._marches:
-            return
+        """Save the results that are not saved yet."""
         begun = time.perf_counter()
-        if self._new:
-            path = self._folder.jump(len(self._files))
-            self._files.append(write_arrays(path, _joined(self._new)))
-            self._new.clear()
-        steps = {STEPS: self._before + self._computed}
-        state = StoredState(_joined(self._marches), steps, self._files)
-        checkpoint.save(self._folder, state, self._provenance)
+        self._write()
         self._saved = time.perf_counter()
         self._cost = self._saved - begun
 
+    # -- of a subclass ------------------------------------------------------------------------
+    def _write(self) -> None:
+        """Write the results that are not saved yet."""
+        raise NotImplementedError
+
+    def _of_another_version(self, wrong: object) -> UserError:
+        """Return the error about stored steps that are not those of this run."""
+        raise NotImplementedError
+
     def _compute(self) -> None:
-        """Tell the reporter, before the first computed step, that earlier ones were restored."""
-        if self._before and not self._going_on:
-            self._going_on = True
-            self._reporter.goes_on()
+        """Handle that the next step is computed and not restored."""
+
+    def _warnings(self) -> list[str]:
+        """Return the warnings so far; those of a step are stored with it."""
+        return []
+
+    def _warn(self, line: str) -> None:
+        """Repeat a warning of a restored step."""
+
+    def _spend(self, seconds: float) -> None:
+        """Count the seconds that storing a step has taken."""
 
     # -- places -------------------------------------------------------------------------------
     def _next(self) -> Place:
@@ -158,7 +151,7 @@ class RunSteps:
     def _keep(self, among: dict[Place, bytes], place: Place, name: str, value: T, warned: int) -> T:
         """Store the result of a step and its warnings, in place of the steps within it."""
         begun = time.perf_counter()
-        data, faithful = packed((name, value, self._reporter.warnings[warned:]))
+        data, faithful = packed((name, value, self._warnings()[warned:]))
         inside = place[:-1] if among is self._marches else place
         for steps in (self._new, self._marches):
             while steps and _within(last := next(reversed(steps)), inside):
@@ -167,8 +160,7 @@ class RunSteps:
         self._computed += 1
         if begun - self._saved > self._cost / SHARE:
             self.save()
-        seconds = self._reporter.seconds
-        seconds["checkpoints"] = seconds.get("checkpoints", 0.0) + time.perf_counter() - begun
+        self._spend(time.perf_counter() - begun)
         if faithful:
             return value
         handed_on: T = self._read(data, name)
@@ -183,32 +175,91 @@ class RunSteps:
         if written != name:
             raise self._of_another_version(f"{written} in the place of {name}")
         for line in warnings:
-            self._reporter.warn(line)
+            self._warn(line)
         return value
+
+
+class RunSteps(StoredSteps):
+    """Steps of a run that are stored in its folder."""
+
+    def __init__(self, run: Run[Any]) -> None:
+        self._folder, self._reporter, self._provenance = run.folder, run.reporter, run.provenance
+        self._files = [] if run.kept is None else list(run.kept.jumps)
+        try:
+            self._before = 0 if run.kept is None else int(run.kept.attributes[STEPS])
+            marches = {} if run.kept is None else unjoined(run.kept.arrays)
+        except KeyError as error:
+            raise self._of_another_version(error) from error
+        super().__init__(self._of_files(marches), marches)
+        self._going_on = False
+        if run.kept is not None:
+            run.reporter.say(f"  continues after {counted(self._before, 'step')}")
+
+    def record(self, number: int, arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> None:
+        """Write the file of this ``number``, in place of later ones that an interruption left."""
+        digest = write_arrays(self._folder.jump(number), arrays, attributes)
+        self._files[number:] = [digest]
+
+    def report(self) -> None:
+        """Log how many steps this process has computed."""
+        self._reporter.log(f"steps: {self._computed} computed, {self._before} resumed")
+
+    def save(self) -> None:
+        if self._new or self._marches:
+            super().save()
+
+    def _write(self) -> None:
+        if self._new:
+            path = self._folder.jump(len(self._files))
+            self._files.append(write_arrays(path, joined(self._new)))
+            self._new.clear()
+        steps = {STEPS: self._before + self._computed}
+        state = StoredState(joined(self._marches), steps, self._files)
+        checkpoint.save(self._folder, state, self._provenance)
+
+    def _compute(self) -> None:
+        """Tell the reporter, before the first computed step, that earlier ones were restored."""
+        if self._before and not self._going_on:
+            self._going_on = True
+            self._reporter.goes_on()
+
+    def _warnings(self) -> list[str]:
+        return self._reporter.warnings
+
+    def _warn(self, line: str) -> None:
+        self._reporter.warn(line)
+
+    def _spend(self, seconds: float) -> None:
+        spent = self._reporter.seconds
+        spent["checkpoints"] = spent.get("checkpoints", 0.0) + seconds
 
     def _of_another_version(self, wrong: object) -> UserError:
         of = f"{self._folder.jumps}: of another version of fretscale"
         return UserError(f"{of} ({wrong}); {self._folder.again}")
 
-    def _of_files(self) -> dict[Place, bytes]:
-        """Return the stored results of steps.
-
-        Steps within a step whose result is stored are left out, and so are steps of a march before
-        the state that it has reached.
-        """
+    def _of_files(self, marches: Mapping[Place, bytes]) -> dict[Place, bytes]:
+        """Return the stored results of steps."""
         kept: dict[Place, bytes] = {}
         for number in range(len(self._files)):
             arrays, _ = read_arrays(self._folder.jump(number))
             if PLACES in arrays:
-                kept |= _unjoined(arrays)
-        reached = {place[:-1]: place for place in self._marches}
+                kept |= unjoined(arrays)
+        return outermost(kept, marches)
 
-        def counts(place: Place) -> bool:
-            above = [place[:length] for length in range(1, len(place))]
-            known = any(step in kept for step in above)
-            return not known and all(reached.get(step) in (None, *above) for step in above)
 
-        return {place: data for place, data in kept.items() if counts(place)}
+def outermost(kept: Mapping[Place, bytes], marches: Mapping[Place, bytes]) -> dict[Place, bytes]:
+    """Return the results of steps that are not within a step whose result is stored.
+
+    Steps of a march before the state that it has reached are left out as well.
+    """
+    reached = {place[:-1]: place for place in marches}
+
+    def counts(place: Place) -> bool:
+        above = [place[:length] for length in range(1, len(place))]
+        known = any(step in kept for step in above)
+        return not known and all(reached.get(step) in (None, *above) for step in above)
+
+    return {place: data for place, data in kept.items() if counts(place)}
 
 
 def _within(place: Place, other: Place) -> bool:
@@ -218,7 +269,7 @@ def _within(place: Place, other: Place) -> bool:
 # --- on disk ------------------------------------------------------------------------------------
 
 
-def _joined(steps: Mapping[Place, bytes]) -> dict[str, Any]:
+def joined(steps: Mapping[Place, bytes]) -> dict[str, Any]:
     """Return the results of steps as arrays, one after the other."""
     lengths = [len(data) for data in steps.values()]
     return {
@@ -228,8 +279,8 @@ def _joined(steps: Mapping[Place, bytes]) -> dict[str, Any]:
     }
 
 
-def _unjoined(arrays: Mapping[str, Any]) -> dict[Place, bytes]:
-    """Return the results of steps from the arrays of :func:`_joined`."""
+def unjoined(arrays: Mapping[str, Any]) -> dict[Place, bytes]:
+    """Return the results of steps from the arrays of :func:`joined`."""
     places = [tuple(map(int, place.split(b"."))) for place in arrays[PLACES].tolist()]
     ends, values = arrays[ENDS].tolist(), arrays[VALUES].tobytes()
     spans = pairwise([0, *ends])

@@ -15,17 +15,17 @@ from sa_solver.types import Array, Frame, Grid, Material
 from tests.conftest import CASES
 from wear.cracking.bulk_stress import SIDE
 from wear.cracking.life import ruiz, smith_watson_topper
-from workflow.analyses.wear.case.sections import ContactStress
-from workflow.analyses.wear.stress.body_stress import (
+from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.translation import face_contact
+from workflow.kinds import load_case
+from workflow.models.contact import FaceContact
+from workflow.models.stress.body_stress import (
     Planes,
     StressedBody,
     StressedCycle,
     with_known_shear,
 )
-from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.translation import face_contact
-from workflow.kinds import load_case
-from workflow.models.contact import FaceContact
+from workflow.models.stress.settings import Stress
 from workflow.models.structure import StructureLoads
 
 PLANE = CASES / "dovetail_2d.yaml"
@@ -61,7 +61,9 @@ class Flank:
         known = with_known_shear(stage, given, loads)
         cycle = StressedCycle(known, loads, stress.faces[0], stress.fields)
         bodies = StressedBody(stage, case.material(1), 1), StressedBody(stage, case.material(2), 2)
-        return cls(source, stage, cycle, given.unknown, Planes(case.stress, stage.grid), bodies)
+        return cls(
+            source, stage, cycle, given.unknown, Planes(case.stress.described(), stage.grid), bodies
+        )
 
     def history(self, body: int, cycle: StressedCycle | None = None) -> Array:
         """Return the stress at the critical distance ``(t, 6, nx)``."""
@@ -189,7 +191,7 @@ def test_there_is_no_stress_where_the_body_is_not(body) -> None:
     there = (grid.x[:, 0] > low) & (grid.x[:, 0] < high)
     assert history[0, 2][there].max() < 0.0
     assert not history[0, :, ~there].any()
-    planes = Planes(ContactStress(section="x", depth=0.9), grid)
+    planes = Planes(Stress(depth=0.9), grid)
     past = SimpleNamespace(increment=lambda _: past, at=lambda row, z: np.zeros((1, 6, 16, len(z))))
     section = stressed.section(cycle, past, planes, 0)
     assert np.isfinite(section[:, there]).all()

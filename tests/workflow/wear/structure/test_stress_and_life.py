@@ -18,9 +18,15 @@ from wear.contact.face_loads import CycleLoads
 from wear.contact.link import StructureLink
 from wear.contact.tractions import CycleTractions
 from wear.cracking.bulk_stress import BulkStress
-from workflow.analyses.wear.case.sections import ContactStress, Life
-from workflow.analyses.wear.stress.body_stress import Planes, StressedBody, StressedCycle
-from workflow.analyses.wear.stress.contact_stress import _report_carried, _report_stick, life_maps
+from workflow.analyses.wear.output.contact_stress import _report_carried, _report_stick
+from workflow.models.stress.body_stress import Planes, StressedBody, StressedCycle
+from workflow.models.stress.contact_stress import (
+    BodyStress,
+    ContactMoment,
+    InterfaceStress,
+    life_maps,
+)
+from workflow.models.stress.settings import Stress
 from workflow.shell.output.results import grid_of
 
 FLANKS = ("intrados", "extrados")
@@ -173,7 +179,7 @@ def reversed_cycle(grid: Grid) -> CycleTractions:
 
 
 def maps(
-    life: Life, grid: Grid, body: Literal[1, 2], cycle: CycleTractions, known: np.ndarray
+    life: Stress, grid: Grid, body: Literal[1, 2], cycle: CycleTractions, known: np.ndarray
 ) -> dict[str, Array]:
     """Return maps at the critical distance, under the tractions alone."""
     transfer = SimpleNamespace(inside=np.ones(grid.shape, dtype=bool))
@@ -198,7 +204,7 @@ def test_symmetric_load_fares_both_flanks_alike(normal: Any) -> None:
 @pytest.mark.parametrize("parameter", ["ruiz", "smith_watson_topper", "findley"])
 def test_reversed_sliding_is_alike_in_both_bodies_and_at_both_ends(parameter: str) -> None:
     grid = Grid.covering((2.0, 2.0), (20, 16))
-    cycle, life = reversed_cycle(grid), Life.model_validate({"parameter": parameter})
+    cycle, life = reversed_cycle(grid), Stress(parameter=parameter)
     known = np.ones(2, dtype=bool)
     name = "cracking_parameter" if parameter == "ruiz" else parameter
     value, of_body_2 = (maps(life, grid, n, cycle, known)[name] for n in (1, 2))
@@ -217,7 +223,7 @@ def test_reversed_sliding_is_alike_in_both_bodies_and_at_both_ends(parameter: st
 def test_increments_with_unknown_shear_add_work_but_no_stress() -> None:
     grid = Grid.covering((2.0, 2.0), (20, 16))
     cycle, both, one = reversed_cycle(grid), np.array([True, True]), np.array([True, False])
-    every, first = (maps(Life(), grid, 2, cycle, known) for known in (both, one))
+    every, first = (maps(Stress(), grid, 2, cycle, known) for known in (both, one))
     np.testing.assert_array_equal(every["friction_parameter"], first["friction_parameter"])
     # Sliding along x, body 2 is pulled at +x; the tension at -x belongs to the way back.
     assert every["tension"][:6].max() > 10.0 * first["tension"][:6].max()
@@ -267,9 +273,11 @@ def test_what_is_not_known_of_the_structure_is_warned_of(fits: list[float], repo
         StructureLink(np.zeros((1, 3, 2, 1)), np.zeros((2, 2)), np.array([0.3, q, 0.0]))
         for q in fits
     ]
-    carried = [BulkStress(link, METAL, 1) for link in links]
-    moment = SimpleNamespace(carried=carried)
-    stress: Any = SimpleNamespace(name="a", bulk=len(fits) == 2, moments={"unworn": moment})
+    carried = tuple(BulkStress(link, METAL, 1) for link in links)
+    bodies: Any = {1: BodyStress(None, {}), 2: BodyStress(None, {})}
+    moment = ContactMoment(bodies, carried, np.array([]))
+    grid = Grid.covering((2.0, 2.0), (4, 4))
+    stress = InterfaceStress("a", Planes(Stress(), grid), {"unworn": moment}, np.zeros(1), 0)
     received: Any = Warnings()
     _report_carried(stress, received)
     assert len(received.printed) == bool(reported)
@@ -308,7 +316,7 @@ def test_sections_that_cannot_be_are_refused(start, tmp_path, overrides, words):
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_section_lies_where_it_says(axis: str) -> None:
     grid = Grid.covering((2.0, 3.0), (10, 12))
-    settings = ContactStress.model_validate({"section": axis, "at": "0.33 mm"})
+    settings = Stress(axis, at=0.33)
     planes, centres = Planes(settings, grid), (grid.x.ravel(), grid.y.ravel())
     along, across = centres if axis == "x" else centres[::-1]
     np.testing.assert_array_equal(planes.along, along)

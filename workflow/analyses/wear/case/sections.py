@@ -30,6 +30,7 @@ from workflow.case.text.plain import plain, shares, times
 
 if TYPE_CHECKING:
     from workflow.models import structure_model
+    from workflow.models.stress import settings as stress_settings
 
 # The sizes that a wear step may be given.
 SIZES = ("cycles", "depth", "volume", "fraction")
@@ -388,7 +389,16 @@ class ContactStress(Section):
             )
         return self
 
-    @property
-    def wanted(self) -> bool:
-        """True if any stress has to be computed."""
-        return self.section != "none" or self.life.parameter != "none"
+    def described(self) -> stress_settings.Stress:
+        """Return the settings as the model takes them."""
+        from workflow.models.stress import settings as stress_settings
+
+        return stress_settings.Stress(
+            section=self.section,
+            at=self.at,
+            depth=self.depth,
+            points=self.points,
+            parameter=self.life.parameter,
+            critical_distance=self.life.depth,
+            sensitivity=self.life.sensitivity,
+        )

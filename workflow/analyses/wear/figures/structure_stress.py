@@ -13,7 +13,8 @@ from matplotlib.tri import Triangulation
 
 from sa_solver.types import Array
 from workflow.analyses.wear.output.body_mesh import body_mesh
-from workflow.analyses.wear.output.layout import MOMENTS, WearContents
+from workflow.analyses.wear.output.layout import WearContents
+from workflow.models.stress.layout import MOMENTS
 from workflow.pictures.fields import scaled_panels
 from workflow.pictures.style import BLACK
 from workflow.shell.output.results import grid_of

@@ -13,7 +13,8 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator
 
 from sa_solver.types import Array, Grid
-from workflow.analyses.wear.output.layout import MOMENTS, WearContents
+from workflow.analyses.wear.output.layout import WearContents
+from workflow.models.stress.layout import MOMENTS
 from workflow.pictures.fields import (
     FLAT,
     PROFILE_MARGIN,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from workflow.analyses.contact.output.layout import LOAD_HISTORY, ON_GRID, TRACTIONS
 from workflow.analyses.wear.output.loop_table import OVER_ENERGY
 from workflow.layout.declared import GRID, Layout
+from workflow.models.stress.layout import BODY, LIFE, SECTION, SECTION_AXES
 
-MOMENTS = "unworn", "worn"
 # Ratio of the cycles to which kinetics are extrapolated to the computed cycles.
 EXTRAPOLATION = 2.0
 # Sources of error, in the order of their datasets.
@@ -22,7 +22,6 @@ PRESSURES = {
 RESULTS = WORN | PRESSURES | {"life": "fretting parameter", "notch_stress": "notch stress"}
 # Group of the face of body 1, below that of the contact, which is the face of body 2.
 OTHER_FACE = "face_1"
-_BULK = "with what the structure carries past it where the group says bulk_stress"
 FACE_MESH = """
     coordinates | mm | {node} component | nodes in the interface frame
     facets | 1 | {facet} corner | corner nodes of triangles, or of segments of a line contact
@@ -75,13 +74,7 @@ bolts/<bolt>
     tension_unworn, tension_worn | N | increment | in each increment, as far as it is meshed, #
 bodies/<body>/error
     notch_stress | {_ERROR}
-bodies/<body>/<moment>
-    points | mm | vertex axis | vertices, the faces of body 2 in their form
-    elements | 1 | element corner | corner vertices of tetrahedra, or of triangles in the plane
-    displacement | mm | vertex axis | displacement at peak load
-    stress | MPa | stress_component vertex | xx, yy, zz, xy, yz, zx of the global axes at peak load
-    von_mises | MPa | vertex | von Mises stress at peak load
-    maximum_principal | MPa | vertex | largest principal stress at peak load
+bodies/<body>/<moment>{BODY}
 bodies/<body>/<moment>/mission
     increments | 1 | increments | increments, counted from 1
     points | mm | surface_vertex axis | vertices of the surface, or of the whole body in the plane
@@ -89,27 +82,11 @@ bodies/<body>/<moment>/mission
     displacement | mm | increments surface_vertex axis | displacement in each increment
     von_mises | MPa | increments surface_vertex | von Mises stress in each increment
     maximum_principal | MPa | increments surface_vertex | largest principal stress in each increment
-stress/section/<face>
-    along | mm | along | centres of the section's cells, along its axis
-    depths | mm | depths | of the section's points below the surface
-stress/section/<face>/<moment>/<body>
-    stress | MPa | stress_component along depths | xx, yy, zz, xy, yz, zx in the section at peak
-        load, {_BULK}
-    von_mises | MPa | along depths | von Mises stress at peak load
+stress/section/<face>{SECTION_AXES}
+stress/section/<face>/<moment>/<body>{SECTION}
 stress/life/<face>/<moment>
     left_out | 1 | left_out_increment | increments whose shear is not fully known, not in the map
-stress/life/<face>/<moment>/<body>
-    friction_parameter | N/mm | x y | Ruiz's F1: a quarter of the friction work of a cycle per area
-    tension | MPa | x y | largest tension along the surface over a cycle,
-        {_BULK}
-    cracking_parameter | N^2/mm^3 | x y | Ruiz's F2: F1 times tension
-    smith_watson_topper | MPa | x y | largest normal stress times strain amplitude, worst plane
-    strain_amplitude | 1 | x y | amplitude of the normal strain on the worst plane
-    findley | MPa | x y | shear stress amplitude plus k largest normal stress, worst plane
-    shear_amplitude | MPa | x y | amplitude of the shear stress on the worst plane
-    normal_stress | MPa | x y | largest normal stress over a cycle on the worst plane,
-        {_BULK}
-    normal | 1 | axis x y | unit normal of the worst plane, in the interface frame
+stress/life/<face>/<moment>/<body>{LIFE}
 error/<face>
     {", ".join(RESULTS)} | {_ERROR}
 """,

@@ -7,9 +7,10 @@ from functools import partial
 from typing import Any
 
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.output.layout import MOMENTS, RESULTS
+from workflow.analyses.wear.output.layout import RESULTS
 from workflow.analyses.wear.output.measures import interfaces
 from workflow.layout.declared import unit_in
+from workflow.models.stress.layout import MOMENTS
 from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, number_at, reported

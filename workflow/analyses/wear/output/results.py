@@ -23,18 +23,20 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.checks.comparison import comparison_summary, write_comparison
 from workflow.analyses.wear.checks.run_errors import warn_of_errors
 from workflow.analyses.wear.checks.uniformity import uniformities
+from workflow.analyses.wear.output.contact_stress import (
+    report_stress,
+    stress_summary,
+    write_stress,
+)
 from workflow.analyses.wear.output.datasets import kinetics_columns, put_face
 from workflow.analyses.wear.output.layout import (
     EXTRAPOLATION,
     LAYOUT,
-    MOMENTS,
     WearContents,
     energy_name,
 )
 from workflow.analyses.wear.output.link_report import link_summary
 from workflow.analyses.wear.output.outcome import STOPPED, InterfaceOutcome, Outcome
-from workflow.analyses.wear.stress.body_stress import StressedCycle, with_known_shear
-from workflow.analyses.wear.stress.contact_stress import InterfaceStress, contact_stresses
 from workflow.analyses.wear.worn.contact_loops import (
     Measurements,
     loops_sentence,
@@ -51,6 +53,7 @@ from workflow.analyses.wear.worn.worn_structure import (
 )
 from workflow.case.text.plain import shares
 from workflow.layout.declared import Arrays
+from workflow.models.stress.contact_stress import InterfaceStress, contact_stresses, cycles_of
 from workflow.models.structure import StructureLoads
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
@@ -129,24 +132,17 @@ def _stresses(
     outcome: Outcome, structure: WornStructure | None, reporter: Reporter, progress: Progress
 ) -> list[InterfaceStress]:
     """Return the stress under every contact; empty if the case does not request it."""
-    if not outcome.case.stress.wanted:
+    settings, peak = outcome.case.stress.described(), outcome.source.peak
+    if not settings.under_contacts:
         return []
-    cycles = []
-    for number, contact in enumerate(outcome.interfaces):
-        stage, worn = contact.stage, contact.unworn
-        if structure is not None:
-            worn = structure.loads(number)
-        found = contact.begin, contact.end
-        unworn, after = (
-            StressedCycle(
-                with_known_shear(stage, tractions, loads),
-                loads,
-                *(structure.under(moment, number) if structure else ()),
-            )
-            for moment, tractions, loads in zip(MOMENTS, found, (contact.unworn, worn), strict=True)
-        )
-        cycles.append((stage, (unworn, after)))
-    return contact_stresses(outcome.case, outcome.source.peak, cycles, reporter, progress)
+    stressed = None if structure is None else structure.stressed
+    cycles = [
+        cycles_of(contact.stage, number, (contact.begin, contact.end), contact.unworn, stressed)
+        for number, contact in enumerate(outcome.interfaces)
+    ]
+    stresses = contact_stresses(settings, peak, cycles, progress)
+    report_stress(stresses, peak, structure is not None, reporter)
+    return stresses
 
 
 def _write_results(
@@ -186,7 +182,7 @@ def _write_results(
             structure.write(writer, case.accuracy)
             structure.bolts.write(writer, kept)
         for stress in stresses:
-            stress.write(writer)
+            write_stress(writer, stress, case)
         for name, errors in budget.items():
             writer.put(f"error/{name}", arrays_of(errors), accuracy=case.accuracy)
         contents = WearContents(
@@ -296,7 +292,7 @@ def _summary(
     recorded: dict[str, PeakHistory],
 ) -> dict[str, Any]:
     state, contacts = outcome.state, outcome.interfaces
-    stress = {under.name: {"stress": under.summary()} for under in stresses}
+    stress = {of.name: {"stress": stress_summary(of, outcome.case)} for of in stresses}
     return {
         "per_length": outcome.source.line,
         "cycles": float(state.cycles[-1]),

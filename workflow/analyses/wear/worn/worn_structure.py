@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fe_models.elasticity.body import maximum_principal
 from fe_models.elasticity.nonlinear import NonlinearCheck
-from fe_models.elasticity.stress import CycleStress, PeakStress, StressField, SurfaceHistory, steps
-from fe_models.meshes.cut_face import WholeStress, whole_components, whole_values
+from fe_models.elasticity.stress import PeakStress, StressField, SurfaceHistory, steps
 from fe_models.meshes.quality import element_sizes, elements_across, radius_ratios
-from fe_models.meshes.remesh import form_of, formed_mesh, worn_volume
-from fe_models.meshes.structure_mesh import Body, Interface, MeshError, StructureMesh, write_msh
-from fe_models.structure import CycleSolution, InterfaceHistory
+from fe_models.meshes.remesh import worn_volume
+from fe_models.meshes.structure_mesh import Body, Interface, StructureMesh, write_msh
 from sa_solver.half_space.stress import von_mises
-from sa_solver.transforms.threads import begun
-from sa_solver.types import Array, LoadHistory, Tally
+from sa_solver.types import LoadHistory, Tally
 from wear.coupled_state import CoupledState
 from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.budget.report import arrays_of, summary_of
@@ -30,6 +27,12 @@ from workflow.analyses.wear.worn.bolts import BoltTensions
 from workflow.case.text.readable import percent
 from workflow.layout.declared import Arrays
 from workflow.models.contact import WornFaces
+from workflow.models.stress.structure_stress import (
+    StressedStructure,
+    begin_worn_mesh,
+    end_cycle,
+    formed_meshes,
+)
 from workflow.models.structure import StructureLoads
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.store import replacing
@@ -47,55 +50,35 @@ MOST_INCREMENTS = 48
 
 @dataclass(frozen=True)
 class WornStructure:
-    """The structure before and after wear: ``cycle`` and ``mesh`` are the worn ones.
+    """The structure before and after wear, with what is written of it.
 
-    ``stresses`` are those of all bodies, unworn and worn. ``written`` are the meshes for output, in
-    which the faces of bodies 2 have their true form. ``shown`` are the increments, counted from 0,
-    in which the stresses include the surfaces.
+    ``written`` are the meshes for output, in which the faces of bodies 2 have their true form.
+    ``shown`` are the increments, counted from 0, in which the stresses include the surfaces.
     """
 
-    stage: StructureLoads
-    mesh: StructureMesh
-    cycle: CycleSolution
-    stresses: dict[str, CycleStress]
+    stressed: StressedStructure
     written: dict[str, StructureMesh]
     shown: list[int]
+
+    @property
+    def stage(self) -> StructureLoads:
+        """The loads of the structure."""
+        return self.stressed.source
 
     @cached_property
     def bolts(self) -> BoltTensions:
         """Tensions of the bolts, unworn and worn."""
-        return BoltTensions(self.stage, self.stage.on_faces(self.cycle))
-
-    def under(
-        self, moment: str, number: int
-    ) -> tuple[tuple[Array, Array], tuple[WholeStress, WholeStress], tuple[Array, Array] | None]:
-        """Return motions of both faces of interface ``number``, and stress fields at peak load.
-
-        The third value holds the thermal strains of the faces, or None without temperatures.
-        """
-        stress, interface = self.stresses[moment], self.stage.mesh.interfaces[number]
-        one, two = (whole_components(interface, moved) for moved in stress.faces[number])
-        field_1, field_2 = (
-            WholeStress(stress.fields[place], interface) for place in interface.bodies
-        )
-        if stress.expansions is None:
-            return (one, two), (field_1, field_2), None
-        hot_1, hot_2 = (whole_values(interface, hot) for hot in stress.expansions[number])
-        return (one, two), (field_1, field_2), (hot_1, hot_2)
-
-    def loads(self, number: int) -> InterfaceHistory:
-        """Return the worn cycle of the whole face of interface ``number``."""
-        return self.stage.on_faces(self.cycle)[number]
+        return BoltTensions(self.stage, self.stage.on_faces(self.stressed.cycle))
 
     def write(self, writer: ResultsWriter, accuracy: float) -> None:
         """Write load histories of the worn faces, and all bodies unworn and worn."""
-        for history in self.stage.on_faces(self.cycle):
+        for history in self.stage.on_faces(self.stressed.cycle):
             name = history.interface.name
             put_face(writer, f"structure_worn/{name}", history.interface, history)
-            put_closure(writer, f"structure_worn/{name}", self.cycle)
+            put_closure(writer, f"structure_worn/{name}", self.stressed.cycle)
             put_closure(writer, f"structure/{name}", self.stage.unworn_cycle)
         for moment, mesh in self.written.items():
-            stress = self.stresses[moment]
+            stress = self.stressed.stresses[moment]
             for body, field in zip(mesh.bodies, stress.fields, strict=True):
                 writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
             for body, surface in zip(mesh.bodies, stress.surfaces, strict=bool(self.shown)):
@@ -107,7 +90,7 @@ class WornStructure:
     def summary(self, state: CoupledState) -> dict[str, Any]:
         """Return statistics of the solver and the largest stresses."""
         stage, unworn = self.stage, self.stage.unworn_cycle
-        bodies = self.mesh.bodies
+        bodies = self.stressed.mesh.bodies
         return {
             "from_cache": stage.from_cache,
             "nodes": {body.name: int(body.mesh.nvertices) for body in bodies},
@@ -132,13 +115,13 @@ class WornStructure:
                     }
                     for body, field in zip(bodies, stress.fields, strict=True)
                 }
-                for moment, stress in self.stresses.items()
+                for moment, stress in self.stressed.stresses.items()
             },
         }
 
     def warn(self, accuracy: float, reporter: Reporter) -> None:
         """Warn of notches whose stress has an error due to the mesh above ``accuracy``."""
-        bodies = self.mesh.bodies
+        bodies = self.stressed.mesh.bodies
         for body, *fields in zip(bodies, *self._fields, strict=True):
             notches = [field.notch for field in fields if field.notch is not None]
             worst = max(notches, key=lambda notch: notch.error, default=None)
@@ -152,7 +135,7 @@ class WornStructure:
     @property
     def _fields(self) -> tuple[tuple[StressField, ...], ...]:
         """Stress fields of all bodies, unworn and worn."""
-        return tuple(stress.fields for stress in self.stresses.values())
+        return tuple(stress.fields for stress in self.stressed.stresses.values())
 
     def _why(self, peak: PeakStress, accuracy: float) -> str:
         """Return the reason why a stress is unreliable, and a remedy."""
@@ -170,7 +153,7 @@ class WornStructure:
 
     def _errors(self) -> dict[str, dict[str, ResultError]]:
         """Return the error of the largest free-surface stress by body; unknown at sharp corners."""
-        bodies = self.mesh.bodies
+        bodies = self.stressed.mesh.bodies
         errors = {}
         for body, *fields in zip(bodies, *self._fields, strict=True):
             left = [field.notch for field in fields if field.notch is not None]
@@ -181,7 +164,7 @@ class WornStructure:
     def sentences(self) -> Iterator[str]:
         """Yield the tensions of bolts and the largest stresses of each body, unworn and worn."""
         yield from self.bolts.sentences()
-        bodies = self.mesh.bodies
+        bodies = self.stressed.mesh.bodies
         for body, unworn, worn in zip(bodies, *self._fields, strict=True):
             parts = []
             if unworn.notch is not None and worn.notch is not None:
@@ -196,9 +179,9 @@ class WornStructure:
     def interface_summary(self, number: int, width: float) -> dict[str, Any]:
         """Return worn volumes in the mesh and resultants; ``width`` [mm] is that of the contact."""
         stage, interface = self.stage, self.stage.mesh.interfaces[number]
-        unworn, worn = stage.unworn()[number].loads, self.loads(number).loads
+        unworn, worn = stage.unworn()[number].loads, self.stressed.history(number).loads
         swept = [
-            worn_volume(stage.mesh.bodies[place], self.mesh.bodies[place], interface, side)
+            worn_volume(stage.mesh.bodies[place], self.stressed.mesh.bodies[place], interface, side)
             for side, place in enumerate(interface.bodies, start=1)
         ]
         return {
@@ -280,20 +263,14 @@ def worn_structure(
     If friction ``evolves``, each contact has its coefficient at the end. If the structure
     ``moves``, the surfaces of all bodies over the increments are included.
     """
-    depths = [contact.depths_of_bodies(state) for contact, state in faces]
-    meshed = list(map(meshed_depths, stage.mesh.interfaces, depths))
-    # The friction solution uses one thread and represents worn faces by their gaps.
-    worn = begun(partial(stage.worn_mesh, meshed))
+    worn = begin_worn_mesh(stage, faces)
     with reported_stage(reporter, stage, "structural friction", "increments"):
-        cycle = stage.worn_cycle(
-            [contact.contact.at_nodes(state.surfaces.depth) for contact, state in faces],
-            [contact.settings.friction(state.energy) for contact, state in faces]
-            if evolves
-            else None,
-        )
+        cycle = end_cycle(stage, faces, evolves)
     with reporter.stage("re-meshing"):
         mesh = worn()
-        written = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
+        written, folded = formed_meshes(stage.mesh, mesh)
+        if folded:
+            reporter.warn(f"{folded}: worn.msh, points and ParaView files show only the worn shape")
         with replacing(
             folder.reserve("worn.msh", "the mesh with the worn faces, in mm")
         ) as unfinished:
@@ -301,9 +278,8 @@ def worn_structure(
     with reporter.stage("stress", "steps") as reported:
         done = Tally(reported, 2 * steps(len(mesh.bodies)))
         shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
-        cycles = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
-        stresses = stage.stresses(cycles, shown, done)
-    return WornStructure(stage, mesh, cycle, stresses, written, shown)
+        stressed = StressedStructure.of(stage, mesh, cycle, shown, done)
+    return WornStructure(stressed, written, shown)
 
 
 def shown_increments(count: int, peak: int) -> list[int]:
@@ -311,26 +287,6 @@ def shown_increments(count: int, peak: int) -> list[int]:
     evenly = np.linspace(0, count - 1, min(count, MOST_INCREMENTS)).round().astype(int)
     evenly[np.argmin(np.abs(evenly - peak))] = peak
     return [int(increment) for increment in evenly]
-
-
-def meshed_depths(interface: Interface, depths: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Return the depths of both bodies at meshed nodes, which come first in a whole face."""
-    depth_1, depth_2 = depths
-    return depth_1[: len(interface.nodes_1)], depth_2[: len(interface.nodes_2)]
-
-
-def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, StructureMesh]:
-    """Return the meshes, the unworn one first, with vertices moved to the form of their faces.
-
-    Stress is not solved on them: the form ends at the border of its face, where the mesh would get
-    a corner, a notch that the body does not have.
-    """
-    form = form_of(meshes["unworn"])
-    try:
-        return {moment: formed_mesh(mesh, form) for moment, mesh in meshes.items()}
-    except MeshError as error:
-        reporter.warn(f"{error}: worn.msh, points and ParaView files show only the worn shape")
-        return meshes
 
 
 def resultants_at(loads: LoadHistory, increment: int) -> dict[str, float]:

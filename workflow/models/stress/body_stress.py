@@ -24,14 +24,14 @@ from wear.contact.sticking import with_sticking_shear
 from wear.contact.tractions import CycleTractions
 from wear.cracking.bulk_stress import SIDE, BodyFace, BulkStress
 from wear.cracking.life import tension_along
-from workflow.analyses.wear.case.sections import ContactStress
 from workflow.models.contact import FaceContact
+from workflow.models.stress.settings import Stress
 
 
 class Planes:
     """Places of computed stress: the points of the section and the depth of the maps."""
 
-    def __init__(self, settings: ContactStress, grid: Grid) -> None:
+    def __init__(self, settings: Stress, grid: Grid) -> None:
         self.settings = settings
         self.grid = grid
         centres = grid.x.ravel(), grid.y.ravel()
@@ -39,7 +39,7 @@ class Planes:
         self.along, across = centres[self._along], centres[1 - self._along]
         self._row = int(np.argmin(np.abs(across - settings.at)))
         self.at = float(across[self._row])
-        first, share = settings.life.depth, np.linspace(0.0, 1.0, settings.points)
+        first, share = settings.critical_distance, np.linspace(0.0, 1.0, settings.points)
         self.depths: Array = first + (settings.depth - first) * share**2
 
     def sections(self, wanted: Sequence[tuple[SubsurfaceStress, Array, Array]]) -> list[Array]:

@@ -1,1 +1,0 @@
-"""Stress under worn contacts."""

@@ -1,0 +1,99 @@
+"""Steps of a model in Python that are stored in one file, so that an interrupted run can resume."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workflow.errors import UserError
+from workflow.shell.folders.steps import Place, StoredSteps, joined, outermost, unjoined
+from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
+
+# Groups of the finished steps and of the states that marches have reached, and the attribute with
+# the digest of the model.
+FINISHED, MARCHES, MODEL = "finished/", "marches/", "model"
+
+
+class FileSteps(StoredSteps):
+    """Steps of a ``model`` in the file ``path``.
+
+    Raises UserError for a file of another model, or without steps.
+    """
+
+    def __init__(self, path: Path, model: object) -> None:
+        self._path, self._model = path, content_digest(model)
+        self._earlier, marches = self._stored()
+        super().__init__(dict(self._earlier), marches)
+
+    def _stored(self) -> tuple[dict[Place, bytes], dict[Place, bytes]]:
+        """Return the finished steps of the file, and the states of its marches."""
+        if not self._path.exists():
+            return {}, {}
+        try:
+            arrays, attributes = read_arrays(self._path)
+            if attributes[MODEL] != self._model:
+                raise UserError(f"{self._path}: of another model; remove it, or name another file")
+            finished, marches = (_unjoined(arrays, group) for group in (FINISHED, MARCHES))
+        except DamagedFile as error:
+            raise UserError(str(error)) from error
+        except KeyError as error:
+            raise self._of_another_version(error) from error
+        return outermost(finished, marches), marches
+
+    def _write(self) -> None:
+        finished = outermost(self._earlier | self._new, self._marches)
+        groups = {FINISHED: finished, MARCHES: self._marches}
+        arrays = {
+            group + name: array
+            for group, steps in groups.items()
+            for name, array in joined(steps).items()
+        }
+        write_arrays(self._path, arrays, {MODEL: self._model})
+
+    def _of_another_version(self, wrong: object) -> UserError:
+        return UserError(f"{self._path}: not the steps of this version of fretscale ({wrong})")
+
+
+def _unjoined(arrays: Mapping[str, Any], group: str) -> dict[Place, bytes]:
+    """Return the steps of one group of a file."""
+    named = {name.removeprefix(group): a for name, a in arrays.items() if name.startswith(group)}
+    return unjoined(named)
+
+
+def content_digest(value: object) -> str:
+    """Return a digest of the entries of dataclasses, of arrays, and of all that they hold.
+
+    Functions count by their names.
+    """
+    digest = hashlib.sha256()
+    for part in _content(value):
+        digest.update(len(part).to_bytes(8, "big") + part)
+    return digest.hexdigest()
+
+
+def _content(value: Any) -> Iterator[bytes]:
+    """Yield the content of a value as bytes."""
+    if isinstance(value, np.ndarray):
+        yield f"{value.dtype.str} {value.shape}".encode()
+        yield value.tobytes()
+    elif is_dataclass(value) and not isinstance(value, type):
+        yield type(value).__qualname__.encode()
+        for field in fields(value):
+            yield field.name.encode()
+            yield from _content(getattr(value, field.name))
+    elif isinstance(value, Mapping):
+        yield from _content(list(value.items()))
+    elif isinstance(value, list | tuple):
+        yield f"{len(value)} entries".encode()
+        for entry in value:
+            yield from _content(entry)
+    elif callable(value) and hasattr(value, "__qualname__"):
+        yield f"{value.__module__}.{value.__qualname__}".encode()
+    else:
+        yield pickle.dumps(value)

@@ -1,0 +1,1 @@
+"""Stress of the bodies of a wear model, and under its contacts."""
