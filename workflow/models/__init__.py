@@ -21,20 +21,26 @@ if TYPE_CHECKING:
     from workflow.models.rig.rig_model import RigModel
     from workflow.models.structure import StructureLoads
     from workflow.models.structure_model import LoadCycle, Nonlinearity, StructureModel
+    from workflow.models.uncoupled.body_pair import BodyPair
+    from workflow.models.uncoupled.given_loads import GivenLoads
+    from workflow.models.uncoupled.load_table import LoadTable
     from workflow.models.vibration.model import VibrationModel
     from workflow.models.vibration.sweep import FrequencySweep
     from workflow.models.wear import WearModel
 
 __all__ = [
     "AddedGap",
+    "BodyPair",
     "Contact",
     "ContactFace",
     "DovetailJoint",
     "DovetailMesh",
     "FrequencySweep",
+    "GivenLoads",
     "LegPath",
     "LoadCycle",
     "LoadSource",
+    "LoadTable",
     "MeshAssembly",
     "MotionModel",
     "Nonlinearity",
@@ -62,6 +68,9 @@ __getattr__, __dir__ = lazy_names(
         "rig.rig_model": ("RigModel",),
         "structure": ("StructureLoads",),
         "structure_model": ("LoadCycle", "Nonlinearity", "StructureModel"),
+        "uncoupled.given_loads": ("GivenLoads",),
+        "uncoupled.load_table": ("LoadTable",),
+        "uncoupled.body_pair": ("BodyPair",),
         "vibration.model": ("VibrationModel",),
         "vibration.sweep": ("FrequencySweep",),
         "wear": ("WearModel",),

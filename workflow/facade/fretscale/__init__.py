@@ -12,6 +12,8 @@ Models in Python
     - ``DovetailJoint``, ``DovetailMesh``, ``Dovetail``, ``Mission``: the built-in blade root in its
       disk: the joint, its mesh, its section and its loads.
     - ``MeshAssembly``, ``LegPath``, ``TightenedBolt``: bodies of a mesh or CAD file under loads.
+    - ``BodyPair``, ``LoadTable``: a ball, cylinder or any gap under a cycle of forces and motions.
+    - ``GivenLoads``: contact faces with the resultants that another code has found.
     - ``UncoupledSource``, ``LoadSource``: base classes for user-defined loads of ``ContactFace`` s.
     - ``Contact``, ``CoulombFriction``: properties of a contact, and how it is computed.
     - ``Wear``, ``JumpSize``, ``Stop``: how far contacts wear, and in which steps.
@@ -140,12 +142,16 @@ if TYPE_CHECKING:
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
     from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
+    from workflow.models.uncoupled.body_pair import BodyPair
+    from workflow.models.uncoupled.given_loads import GivenLoads
+    from workflow.models.uncoupled.load_table import LoadTable
     from workflow.models.vibration.model import VibrationModel
     from workflow.models.vibration.sweep import FrequencySweep
     from workflow.models.wear import WearModel
 
 __all__ = [
     "AddedGap",
+    "BodyPair",
     "CaseError",
     "Check",
     "Checkpoint",
@@ -161,10 +167,12 @@ __all__ = [
     "FittedParameter",
     "FrequencySweep",
     "FretscaleError",
+    "GivenLoads",
     "Group",
     "JumpSize",
     "LegPath",
     "LoadSource",
+    "LoadTable",
     "MainResult",
     "MeshAssembly",
     "MethodFailed",
@@ -231,6 +239,9 @@ __getattr__, __dir__ = lazy_names(
         "workflow.models.loads": ("ContactFace", "LoadSource", "UncoupledSource"),
         "workflow.models.rig.motion": ("MotionModel",),
         "workflow.models.rig.rig_model": ("RigModel",),
+        "workflow.models.uncoupled.given_loads": ("GivenLoads",),
+        "workflow.models.uncoupled.load_table": ("LoadTable",),
+        "workflow.models.uncoupled.body_pair": ("BodyPair",),
         "workflow.models.vibration.model": ("VibrationModel",),
         "workflow.models.vibration.sweep": ("FrequencySweep",),
         "workflow.models.wear": ("WearModel",),

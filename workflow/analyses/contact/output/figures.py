@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Grid
-from workflow.analyses.contact.load_table import FORCES, MOTIONS
 from workflow.analyses.contact.output.layout import BODIES, ContactContents
 from workflow.case.text.readable import percent
+from workflow.models.uncoupled.load_table import FORCES, MOTIONS
 from workflow.pictures.fields import (
     FLAT,
     MARGIN,
