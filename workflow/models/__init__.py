@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from workflow.models.loops import TangentialLoops
     from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
+    from workflow.models.specimens.fretted import FrettedSpecimens
+    from workflow.models.specimens.reduced import SpecimenPair
     from workflow.models.structure import StructureLoads
     from workflow.models.structure_model import LoadCycle, Nonlinearity, StructureModel
     from workflow.models.uncoupled.body_pair import BodyPair
@@ -36,6 +38,7 @@ __all__ = [
     "DovetailJoint",
     "DovetailMesh",
     "FrequencySweep",
+    "FrettedSpecimens",
     "GivenLoads",
     "LegPath",
     "LoadCycle",
@@ -45,6 +48,7 @@ __all__ = [
     "MotionModel",
     "Nonlinearity",
     "RigModel",
+    "SpecimenPair",
     "StructureLoads",
     "StructureModel",
     "TangentialLoops",
@@ -66,6 +70,8 @@ __getattr__, __dir__ = lazy_names(
         "loops": ("TangentialLoops",),
         "rig.motion": ("MotionModel",),
         "rig.rig_model": ("RigModel",),
+        "specimens.fretted": ("FrettedSpecimens",),
+        "specimens.reduced": ("SpecimenPair",),
         "structure": ("StructureLoads",),
         "structure_model": ("LoadCycle", "Nonlinearity", "StructureModel"),
         "uncoupled.given_loads": ("GivenLoads",),

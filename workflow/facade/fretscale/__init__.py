@@ -15,6 +15,7 @@ Models in Python
     - ``BodyPair``, ``LoadTable``: a ball, cylinder or any gap under a cycle of forces and motions.
     - ``GivenLoads``: contact faces with the resultants that another code has found.
     - ``UncoupledSource``, ``LoadSource``: base classes for user-defined loads of ``ContactFace`` s.
+    - ``SpecimenPair``, ``FrettedSpecimens``: crossed specimens of a friction rig, and their wear.
     - ``Contact``, ``CoulombFriction``: properties of a contact, and how it is computed.
     - ``Wear``, ``JumpSize``, ``Stop``: how far contacts wear, and in which steps.
     - ``AddedGap``: a profile on top of the form of a face.
@@ -142,6 +143,8 @@ if TYPE_CHECKING:
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
     from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
+    from workflow.models.specimens.fretted import FrettedSpecimens
+    from workflow.models.specimens.reduced import SpecimenPair
     from workflow.models.uncoupled.body_pair import BodyPair
     from workflow.models.uncoupled.given_loads import GivenLoads
     from workflow.models.uncoupled.load_table import LoadTable
@@ -167,6 +170,7 @@ __all__ = [
     "FittedParameter",
     "FrequencySweep",
     "FretscaleError",
+    "FrettedSpecimens",
     "GivenLoads",
     "Group",
     "JumpSize",
@@ -185,6 +189,7 @@ __all__ = [
     "Progress",
     "Results",
     "RigModel",
+    "SpecimenPair",
     "Stop",
     "TightenedBolt",
     "UncoupledSource",
@@ -239,6 +244,8 @@ __getattr__, __dir__ = lazy_names(
         "workflow.models.loads": ("ContactFace", "LoadSource", "UncoupledSource"),
         "workflow.models.rig.motion": ("MotionModel",),
         "workflow.models.rig.rig_model": ("RigModel",),
+        "workflow.models.specimens.fretted": ("FrettedSpecimens",),
+        "workflow.models.specimens.reduced": ("SpecimenPair",),
         "workflow.models.uncoupled.given_loads": ("GivenLoads",),
         "workflow.models.uncoupled.load_table": ("LoadTable",),
         "workflow.models.uncoupled.body_pair": ("BodyPair",),
