@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from workflow.models.gaps import AddedGap
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
     from workflow.models.loops import TangentialLoops
+    from workflow.models.rig.joint import WearingJoint
     from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
     from workflow.models.specimens.fretted import FrettedSpecimens
@@ -57,6 +58,7 @@ __all__ = [
     "VibrationModel",
     "Wear",
     "WearModel",
+    "WearingJoint",
 ]
 
 __getattr__, __dir__ = lazy_names(
@@ -68,6 +70,7 @@ __getattr__, __dir__ = lazy_names(
         "gaps": ("AddedGap",),
         "loads": ("ContactFace", "LoadSource", "UncoupledSource"),
         "loops": ("TangentialLoops",),
+        "rig.joint": ("WearingJoint",),
         "rig.motion": ("MotionModel",),
         "rig.rig_model": ("RigModel",),
         "specimens.fretted": ("FrettedSpecimens",),

@@ -22,6 +22,7 @@ Models in Python
     - ``VibrationModel``: a rig with joints under periodic forces; ``run`` computes its motions.
     - ``vibration_model``: the model that a vibration case describes.
     - ``MotionModel``: a rig with joints in time; ``run`` integrates its motion under a force.
+    - ``WearingJoint``: a friction joint alone whose parameters change with dissipated energy.
     - ``RigModel``, ``FrequencySweep``: the rig, and the frequencies of its motions.
     - ``Observer``, ``Progress``, ``Checkpoint``: objects that are called while a model runs.
 
@@ -141,6 +142,7 @@ if TYPE_CHECKING:
     from workflow.models.dovetail import DovetailJoint, DovetailMesh
     from workflow.models.gaps import AddedGap
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
+    from workflow.models.rig.joint import WearingJoint
     from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
     from workflow.models.specimens.fretted import FrettedSpecimens
@@ -197,6 +199,7 @@ __all__ = [
     "VibrationModel",
     "Wear",
     "WearModel",
+    "WearingJoint",
     "check",
     "compare",
     "fit",
@@ -242,6 +245,7 @@ __getattr__, __dir__ = lazy_names(
         "workflow.models.dovetail": ("DovetailJoint", "DovetailMesh"),
         "workflow.models.gaps": ("AddedGap",),
         "workflow.models.loads": ("ContactFace", "LoadSource", "UncoupledSource"),
+        "workflow.models.rig.joint": ("WearingJoint",),
         "workflow.models.rig.motion": ("MotionModel",),
         "workflow.models.rig.rig_model": ("RigModel",),
         "workflow.models.specimens.fretted": ("FrettedSpecimens",),
