@@ -30,7 +30,8 @@ class LoadTable:
 
     Forces act on body 2. Motions are of body 1 relative to body 2, far from the contact. Of a force
     and its motion, one may be given. Quantities without a column are forces of 0, or no bulk
-    stress.
+    stress. Without wear, :func:`sa_solver.march_history` follows such a path:
+    ``ContactLoadPath(table.imposed, table.is_motion)``.
 
     Parameters
     ----------
