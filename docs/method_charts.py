@@ -39,7 +39,7 @@ from sa_solver.cycles.history import ACCURACY
 from sa_solver.types import Array
 from wear import findley
 from wear.cracking.life import PlaneSearch
-from workflow.analyses.specimens.model import SpecimensModel
+from workflow.analyses.specimens.model import reduced_pair
 from workflow.analyses.wear.approximations.approximation import Approximation, Rung
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import structure_loads
@@ -98,7 +98,7 @@ def specimens() -> Ladder:
 
 
 def _cycle(case: Any) -> dict[str, float]:
-    model, load = SpecimensModel(case), case.load_path
+    model, load = reduced_pair(case), case.load_path
     conditions = FrettingConditions(load.normal_forces[-1], load.stroke, case.friction.coefficient)
     cycle = model.pair.fretting_cycle(model.face.gap, conditions)
     return {

@@ -17,29 +17,40 @@ if TYPE_CHECKING:
     from workflow.models.gaps import AddedGap
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
     from workflow.models.loops import TangentialLoops
+    from workflow.models.rig.joint import WearingJoint
     from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
+    from workflow.models.specimens.fretted import FrettedSpecimens
+    from workflow.models.specimens.reduced import SpecimenPair
     from workflow.models.stress.settings import Stress
     from workflow.models.structure import StructureLoads
     from workflow.models.structure_model import LoadCycle, Nonlinearity, StructureModel
+    from workflow.models.uncoupled.body_pair import BodyPair
+    from workflow.models.uncoupled.given_loads import GivenLoads
+    from workflow.models.uncoupled.load_table import LoadTable
     from workflow.models.vibration.model import VibrationModel
     from workflow.models.vibration.sweep import FrequencySweep
     from workflow.models.wear import WearModel
 
 __all__ = [
     "AddedGap",
+    "BodyPair",
     "Contact",
     "ContactFace",
     "DovetailJoint",
     "DovetailMesh",
     "FrequencySweep",
+    "FrettedSpecimens",
+    "GivenLoads",
     "LegPath",
     "LoadCycle",
     "LoadSource",
+    "LoadTable",
     "MeshAssembly",
     "MotionModel",
     "Nonlinearity",
     "RigModel",
+    "SpecimenPair",
     "Stress",
     "StructureLoads",
     "StructureModel",
@@ -49,6 +60,7 @@ __all__ = [
     "VibrationModel",
     "Wear",
     "WearModel",
+    "WearingJoint",
 ]
 
 __getattr__, __dir__ = lazy_names(__name__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -153,6 +153,12 @@ class StructureStore(Protocol):
         """Return the solved cycle of a key on its structure."""
         ...
 
+    def arrays(
+        self, kind: str, key: tuple[object, ...], make: Callable[[], dict[str, Any]]
+    ) -> tuple[dict[str, Any], bool]:
+        """Return the named arrays of a kind and key, and whether they were stored."""
+        ...
+
 
 class NoStore:
     """A store without contents: everything is computed anew."""
@@ -173,3 +179,8 @@ class NoStore:
         make: Callable[[], CycleSolution],
     ) -> CycleSolution:
         return make()
+
+    def arrays(
+        self, kind: str, key: tuple[object, ...], make: Callable[[], dict[str, Any]]
+    ) -> tuple[dict[str, Any], bool]:
+        return make(), False

@@ -32,9 +32,13 @@ from workflow.models.stress.structure_stress import (
 )
 from workflow.models.structure import StructureLoads
 from workflow.models.structure_model import StructureModel, StructureStore
+from workflow.models.uncoupled.body_pair import BodyPair
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Structure = StructureModel | BodyPair | LoadSource
+"""Structure of finite elements, bodies without them, or any other source of loads."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,8 @@ class WearModel:
 
     Parameters
     ----------
-    structure : StructureModel or LoadSource
-        Source of the loads: a structure of finite elements, or any other.
+    structure : StructureModel, BodyPair or LoadSource
+        Source of the loads: a structure of finite elements, two bodies without them, or any other.
     contacts : Contact or mapping of str to Contact
         One contact for all faces, or one for each face by its name.
     wear : Wear
@@ -66,7 +70,7 @@ class WearModel:
     The example of :class:`fretscale.UncoupledSource` runs a model.
     """
 
-    structure: StructureModel | LoadSource
+    structure: Structure
     contacts: Contact | Mapping[str, Contact]
     wear: Wear
     stress: Stress | None = None
@@ -86,6 +90,8 @@ class WearModel:
         if hasattr(self.structure, "meshed"):
             structure = cast("StructureModel", self.structure)
             return StructureLoads(structure, self._unworn_friction, store)
+        if isinstance(self.structure, BodyPair):
+            return self.structure.source(self.contact(self.structure.name))
         return self.structure
 
     def _unworn_friction(self, name: str) -> float:

@@ -25,11 +25,11 @@ from tests.workflow.case_leaves import (
     declaring,
     each_section,
 )
-from workflow.analyses.contact.load_table import FORCES, MOTIONS
 from workflow.case.fields import File, Formats, Path, Quantity, Text, Whole
 from workflow.case.sections import entry_of
 from workflow.errors import CaseError
 from workflow.kinds import kinds, load_case, parse_case
+from workflow.models.uncoupled.load_table import FORCES, MOTIONS
 
 
 def load(leaf, folders, *overrides):

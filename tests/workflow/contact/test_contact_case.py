@@ -8,13 +8,12 @@ import pytest
 
 from sa_solver.types import Material
 from tests.workflow.scenes import BALL
-from workflow.analyses.contact.bodies import bulk_strain
 from workflow.analyses.contact.case import ContactCase, LineContactCase
-from workflow.analyses.contact.load_table import FORCES, LoadTable
 from workflow.case.files.input_files import InputFileError, read_heights
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import parse_case
+from workflow.models.uncoupled.load_table import FORCES, LoadTable
 
 ROLLER = (
     BALL.replace("shape: sphere", "shape: cylinder")
@@ -136,9 +135,9 @@ def test_bulk_stress_strains_each_body_by_its_own_stiffness():
     bodies = Material(1e5, 0.3), Material(np.inf, 0.0)
     stress = np.array([0.0, 100.0])
     table = LoadTable({"P": stress, "bulk_stress_1": stress})
-    np.testing.assert_allclose(bulk_strain(table, bodies), [0.0, -100.0 * 0.91 / 1e5])
+    np.testing.assert_allclose(table.bulk_strain(bodies), [0.0, -100.0 * 0.91 / 1e5])
     table = LoadTable({"P": stress, "bulk_stress_2": stress})
-    np.testing.assert_allclose(bulk_strain(table, bodies[::-1]), [0.0, 100.0 * 0.91 / 1e5])
+    np.testing.assert_allclose(table.bulk_strain(bodies[::-1]), [0.0, 100.0 * 0.91 / 1e5])
 
 
 def with_file(base):

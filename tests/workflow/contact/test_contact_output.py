@@ -16,13 +16,13 @@ from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.types import Grid, Material
 from tests.workflow.output.shown_files import check_arrays, check_scene, total
 from workflow.analyses.contact import ANALYSIS
-from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.output import figures
 from workflow.analyses.contact.output.layout import ContactContents
 from workflow.analyses.contact.output.results import ContactOutcome, write_contact_results
 from workflow.analyses.contact.output.summary import loop_summary, state_summaries
 from workflow.case.text.writing import dump_case
 from workflow.kinds import parse_case
+from workflow.models.uncoupled.load_table import LoadTable
 from workflow.pictures.drawing import write_figures, write_paraview
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import grid_of

@@ -14,7 +14,7 @@ from sa_solver.surfaces.scans import Scan, resampled
 from tests.workflow.files import scan_corpus
 from tests.workflow.scenes import BALL
 from workflow.analyses.contact.surfaces import MeasuredSurfaces
-from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.analyses.wear.structures.bodies.model import source_of
 from workflow.case.files.input_files import InputFileError
 from workflow.case.files.scan_files import ENDINGS, PROFILOMETER, WRITTEN, read_scan, write_scan
 from workflow.errors import CaseError, UserError
@@ -257,7 +257,7 @@ def test_a_contact_that_wears_takes_means_over_any_grid(both):
         "contact.grid=[32, 32]",
         "structure={kind: bodies, shape: plane, surfaces: {body_1: {file: 1.x3p, level: none}}}",
     ]
-    (face,) = BodiesSource(load_case(folder / "wear.yaml", overrides)).faces
+    (face,) = source_of(load_case(folder / "wear.yaml", overrides)).faces
     for cells in ((32, 32), (8, 12)):
         grid = Grid.covering((0.8, 0.8), cells)
         on = resampled(Scan(first, (0.0625, 0.0625)), grid).heights

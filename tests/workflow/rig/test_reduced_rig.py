@@ -13,7 +13,7 @@ from fe_models.joints.reduction import ReducedModel, load_reduced, save_reduced
 from tests.workflow.vibration.time_scenes import MASS, RIG, STIFF, refused, run
 from wear.joints.law import march_joints
 from workflow.analyses.rig.building import rig_model
-from workflow.analyses.specimens.model import SpecimensModel
+from workflow.analyses.specimens.model import reduced_pair
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.memory import memory
 from workflow.analyses.time.rig import motion_of
@@ -95,7 +95,7 @@ def coarsest(tmp_path_factory) -> Iterator[Path]:
 @pytest.fixture(scope="module")
 def body(coarsest) -> ReducedModel:
     """Return its upper specimen."""
-    return SpecimensModel(load_case(coarsest)).reduction.models[1]
+    return reduced_pair(load_case(coarsest)).reduction.models[1]
 
 
 @pytest.fixture

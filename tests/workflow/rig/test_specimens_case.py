@@ -14,7 +14,7 @@ from tests.workflow.command_line import invoke
 from tests.workflow.conftest import manifest_has_all
 from tests.workflow.output.shown_files import check_arrays, check_scene, total
 from wear.contact.link import LARGEST_RESIDUAL
-from workflow.analyses.specimens.model import SpecimensModel
+from workflow.analyses.specimens.model import reduced_pair
 from workflow.errors import CaseError
 from workflow.kinds import parse_case
 
@@ -337,7 +337,8 @@ def as_scans(folder, name, heights):
 
 def model_of(folder, surfaces, *overrides):
     changes = [f"structure.surfaces={surfaces}", "structure.form=null", *overrides]
-    return SpecimensModel(parse_case(SMALL, str(folder / "small.yaml"), changes))
+    case = parse_case(SMALL, str(folder / "small.yaml"), changes)
+    return case.pad_grid, reduced_pair(case)
 
 
 def test_scans_of_specimens_lie_as_their_strips_do(folder):
@@ -346,8 +347,8 @@ def test_scans_of_specimens_lie_as_their_strips_do(folder):
     surfaces = as_scans(folder, "plane", 1e-3 * u + 3e-3 * v)
     only = ({"body_1": surfaces["body_1"]}, {"body_2": surfaces["body_2"]})
     for given, (along_x, along_y) in zip(only, ((1e-3, 3e-3), (3e-3, 1e-3)), strict=True):
-        model = model_of(folder, given)
-        grid, face = model.case.pad_grid, model.face
+        grid, model = model_of(folder, given)
+        face = model.face
         expected = -along_x * grid.x - along_y * grid.y
         np.testing.assert_allclose(model.gap(grid), expected, atol=1e-12)
         # Eight cells a facet, of a sixth of a mm.
@@ -367,8 +368,8 @@ def test_a_form_from_scans_of_specimens_is_the_form(folder):
     off = []
     for squares in (6, 12):
         finer = f"mesh={{pad_elements: {squares}, size: 4 mm, order: 1}}", "reduction.modes=2"
-        scanned = model_of(folder, surfaces, *finer)
-        formed = SpecimensModel(parse_case(SMALL, str(folder / "small.yaml"), finer))
+        grid, scanned = model_of(folder, surfaces, *finer)
+        formed = reduced_pair(parse_case(SMALL, str(folder / "small.yaml"), finer))
         exact = formed.pair.normal(formed.face.gap, 250.0).pressure
         found = scanned.pair.normal(scanned.face.gap, 250.0)
         # The reduced models do not know of the form.
@@ -377,7 +378,6 @@ def test_a_form_from_scans_of_specimens_is_the_form(folder):
         off.append(np.abs(found.pressure - exact).max() / exact.max())
     assert off[0] < 0.02
     assert off[1] < 0.6 * off[0]
-    grid = scanned.case.pad_grid
     half_space = scanned.gap(grid) - formed.gap(grid)
     # Means of cells and of points against their middles: pitch²/24 R each, of all radii.
     expected = (grid.pitch[0] ** 2 - 0.01**2) / 24.0 * 2.0 * (1.0 / 1000.0 + 1.0 / 50.0)

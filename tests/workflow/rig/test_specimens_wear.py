@@ -11,9 +11,9 @@ from wear.laws import EnergyLaw
 from wear.steps.marching import rest
 from wear.steps.steppers import ExplicitStepper, StabilityError
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.analyses.specimens.wear import FrettedPair, wear_in_cycle_blocks
 from workflow.errors import CaseError
 from workflow.kinds import load_case
+from workflow.models.specimens.wear import FrettedPair, wear_in_cycle_blocks
 
 
 @pytest.fixture(scope="module")

@@ -19,12 +19,12 @@ from tests.workflow.vibration.time_scenes import (
     refused,
     run,
 )
-from workflow.analyses.time.joint import steady_loop
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.memory import memory
 from workflow.chart.axes import axes_of
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case
+from workflow.models.rig.joint import steady_loop
 
 CASES = Path(__file__).parents[3] / "cases"
 LAWS = ("bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan")

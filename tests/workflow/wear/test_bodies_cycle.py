@@ -12,7 +12,7 @@ from tests.marks import slow
 from tests.workflow.command_line import command
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
-from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.analyses.wear.structures.bodies.model import source_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError
@@ -43,27 +43,25 @@ def test_legs_begin_where_the_last_one_ends() -> None:
     """A constant force needs to be given once; Qx swings between its two ends."""
     case = area(FORCED)
     assert parse_case(dump_case(case), "dump") == case
-    source = BodiesSource(case)
+    source = source_of(case)
     (cycle,) = source.unworn()
     np.testing.assert_allclose(cycle.loads.P, 50.0)
     np.testing.assert_allclose(cycle.loads.Qx, [0.0, 10.0, 5.0, 0.0, -5.0, -10.0], atol=1e-12)
     assert not cycle.slip.any()
     assert source.peak == 1
     assert source.drive.motion == (False, False, False, True, True, True)
-    free = BodiesSource(area(FORCED.replace("]}", "], tilt: free}")))
+    free = source_of(area(FORCED.replace("]}", "], tilt: free}")))
     assert free.drive.motion == (False, False, False, False, False, True)
 
 
 def test_a_file_says_the_same_as_legs(tmp_path: Path) -> None:
-    legs = BodiesSource(area(FORCED))
+    legs = source_of(area(FORCED))
     columns = legs.unworn()[0].loads
     rows = "\n".join(f"{P},{Qx}" for P, Qx in zip(columns.P, columns.Qx, strict=True))
     (tmp_path / "cycle.csv").write_text(f"P,Qx\n{rows}\n")
     text = str(tmp_path / "case.yaml")
     case = parse_case(AREA, text, [*SMALL, "load_path={file: cycle.csv}"])
-    np.testing.assert_array_equal(
-        BodiesSource(case).drive.values(columns), legs.drive.values(columns)
-    )
+    np.testing.assert_array_equal(source_of(case).drive.values(columns), legs.drive.values(columns))
 
 
 @pytest.mark.parametrize("method", ["normal", "full"])
@@ -169,7 +167,7 @@ TURNING = "{legs: [{P: 60 N, Qx: 12 N}, {P: 40 N, Qx: -12 N}]}"
 
 def cycle_energy(case: BodiesWearCase, parts: int = 1) -> float:
     """Return the energy that an unworn cycle dissipates, with increments in ``parts`` [N mm]."""
-    source = BodiesSource(case, parts)
+    source = source_of(case, parts)
     _, first = face_contact(case, source.faces[0]).contact.begin(source.unworn()[0], 1.0)
     return float(first.energy.sum())
 

@@ -15,7 +15,7 @@ from tests.workflow.command_line import command
 from wear.contact.interface import InterfaceState
 from workflow.analyses.wear import recording
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
-from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.analyses.wear.structures.bodies.model import source_of
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.text.writing import dump_case
@@ -46,7 +46,7 @@ def worn(
     case: BodiesWearCase | LineBodiesWearCase, jumps: int = 4
 ) -> tuple[FaceContact, InterfaceState]:
     """Return the contact after the cycles of the case, computed in this process."""
-    source = BodiesSource(case)
+    source = source_of(case)
     stage = face_contact(case, source.faces[0])
     state, _ = stage.contact.begin(source.unworn()[0], case.wear.cycles)
     for jump in range(jumps):
@@ -106,7 +106,7 @@ def test_cases_of_the_repository_expect_something(name: str) -> None:
 def test_a_cycle_goes_there_and_back() -> None:
     """The motion has constant speed along the direction and is closed; friction opposes it."""
     case = area("load_path.increments=3", "load_path.direction=30 deg", "friction.coefficient=0.5")
-    source = BodiesSource(case)
+    source = source_of(case)
     motion = source.motion
     np.testing.assert_allclose(np.hypot(*motion.T), 0.05 / 3, rtol=1e-12)
     np.testing.assert_allclose(motion.sum(axis=0), 0.0, atol=1e-15)
@@ -126,7 +126,7 @@ def test_a_cycle_goes_there_and_back() -> None:
 
 def test_faces_travel_to_the_processes_of_contacts() -> None:
     for case in (area(), area(f"structure={FLAT}"), line(), line(f"structure={STRIP}")):
-        (face,) = BodiesSource(case).faces
+        (face,) = source_of(case).faces
         again = pickle.loads(pickle.dumps(face))
         grid = again.grid(case.contact.grid)
         np.testing.assert_array_equal(again.gap(grid.x, grid.y), face.gap(grid.x, grid.y))
@@ -134,7 +134,7 @@ def test_faces_travel_to_the_processes_of_contacts() -> None:
 
 
 def test_a_flat_stands_on_its_step() -> None:
-    (face,) = BodiesSource(area(f"structure={FLAT}")).faces
+    (face,) = source_of(area(f"structure={FLAT}")).faces
     grid = face.grid((40, 40))
     gap = face.gap(grid.x, grid.y)
     assert set(np.unique(gap)) == {0.0, 0.005}
@@ -157,7 +157,7 @@ def test_volume_is_what_sliding_that_far_wears() -> None:
 
 def test_heights_of_a_cylinder_wear_as_the_cylinder(tmp_path: Path) -> None:
     case = line("wear.cycles=1000")
-    (face,) = BodiesSource(case).faces
+    (face,) = source_of(case).faces
     grid = face.grid(case.contact.grid)
     np.save(tmp_path / "gap.npy", face.gap(grid.x, grid.y))
     heights = "structure={kind: bodies, shape: heights, file: gap.npy}"
@@ -234,7 +234,7 @@ def test_partial_slip_over_a_given_stroke_is_that_of_mindlin() -> None:
         *("load_path.P=400 N", "load_path.stroke=13.39046 um", "load_path.increments=4"),
         *("friction.coefficient=0.7", "contact.method=full", "wear.cycles=1"),
     )
-    source = BodiesSource(case)
+    source = source_of(case)
     stage = face_contact(case, source.faces[0])
     _, first = stage.contact.begin(source.unworn()[0], case.wear.cycles)
     assert first.energy.sum() == pytest.approx(0.414092, rel=2e-2)
@@ -310,8 +310,8 @@ def test_moments_that_hold_the_tilt_are_results(dimension: int, tmp_path: Path) 
 def test_a_loop_on_worn_surfaces_keeps_the_tilt_too() -> None:
     for tilt, moments in (("held", None), ("free", (0.0, 0.0))):
         case = line(f"load_path.tilt={tilt}", "loops.amplitude=1 um")
-        stage = face_contact(case, BodiesSource(case).faces[0])
-        state, _ = stage.contact.begin(BodiesSource(case).unworn()[0], 1.0)
+        stage = face_contact(case, source_of(case).faces[0])
+        state, _ = stage.contact.begin(source_of(case).unworn()[0], 1.0)
         path = case.loops.described().path(stage.name, state, 0, stage.settings.drive.tilt)
         assert path.moments == moments
 

@@ -20,7 +20,7 @@ from workflow.analyses.wear.case.gaps import ParaboloidGap, RoundedGap
 from workflow.analyses.wear.checks.warnings import warn_of_file
 from workflow.analyses.wear.gaps import gap_over
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
-from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.structures.resultants.model import given_loads
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
@@ -162,7 +162,7 @@ def test_interfaces_may_differ(written):
         "structure.interfaces=[{name: late, size: [8, 20], gap: {shape: paraboloid, radius_x: 1 m},"
         f" frame: {FRAME}}}, {{name: early}}]"
     ]
-    source = ResultantsSource(load_case(written, [*SMALL, *overrides]))
+    source = given_loads(load_case(written, [*SMALL, *overrides]))
     late, early = source.faces
     assert (late.face.name, early.face.name) == ("late", "early")
     assert late.size == pytest.approx((8.0, 20.0), rel=1e-15)
@@ -401,7 +401,7 @@ def test_loads_that_do_not_close_are_warned_of(tmp_path, closure, reported):
     text = template("resultants").replace("dimension: 3", "dimension: 2")
     case = parse_case(text, str(tmp_path / "case.yaml"))
     reporter = Reporter(tmp_path / "log")
-    warn_of_file(ResultantsSource(case), reporter)
+    warn_of_file(case, reporter)
     assert len(reporter.warnings) == reported
     assert all("0.20 % of the largest" in line for line in reporter.warnings)
 

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from sa_solver.surfaces import shapes
 from sa_solver.types import Array, ElasticPair, Grid
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.load_path import ContactPath, LegsOrFile, LineContactPath
-from workflow.analyses.contact.load_table import PRESSING, LoadTable
 from workflow.analyses.contact.plausibility import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.case.fields import File, Quantity
@@ -41,6 +42,8 @@ from workflow.case.sections import (
 )
 from workflow.case.source import Source
 from workflow.case.text.plain import of_bodies, plain, shape_in_words
+from workflow.models.gaps import GapFunction
+from workflow.models.uncoupled.load_table import PRESSING, LoadTable
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual contact.
 Poisson = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]
@@ -80,11 +83,11 @@ class Shape(Bodies):
     """Two bodies whose gap is known at any point."""
 
     @abstractmethod
-    def height(self, x: Array, y: Array) -> Array:
-        """Return the gap before loading [mm] at ``x`` and ``y``, which broadcast together."""
+    def described(self) -> GapFunction:
+        """Return the gap before loading as a function of the place."""
 
     def form_on(self, grid: Grid) -> Array:
-        return self.height(grid.x, grid.y)
+        return self.described()(grid.x, grid.y)
 
 
 class Plane(Shape):
@@ -93,8 +96,8 @@ class Plane(Shape):
     shape: Literal["plane"] = entry("a plane all over the grid", "plane")
     surfaces: MeasuredSurfaces = entry("measured heights, with their whole form")
 
-    def height(self, x: Array, y: Array) -> Array:
-        return np.zeros_like(x + y)
+    def described(self) -> GapFunction:
+        return shapes.plane
 
 
 class Sphere(Shape):
@@ -103,8 +106,8 @@ class Sphere(Shape):
     shape: Literal["sphere"] = entry("sphere, ellipsoid, plane or heights", "sphere")
     radius: RoundingRadius = entry("relative radius, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
 
-    def height(self, x: Array, y: Array) -> Array:
-        return (x**2 + y**2) / (2.0 * self.radius)
+    def described(self) -> GapFunction:
+        return partial(shapes.sphere, radius=self.radius)
 
 
 class Ellipsoid(Shape):
@@ -114,8 +117,8 @@ class Ellipsoid(Shape):
     radius_x: RoundingRadius = entry("relative radius of the section along x [mm]", "10 mm")
     radius_y: RoundingRadius = entry("relative radius of the section along y [mm]", "20 mm")
 
-    def height(self, x: Array, y: Array) -> Array:
-        return x**2 / (2.0 * self.radius_x) + y**2 / (2.0 * self.radius_y)
+    def described(self) -> GapFunction:
+        return partial(shapes.ellipsoid, radius_x=self.radius_x, radius_y=self.radius_y)
 
 
 class Cylinder(Shape):
@@ -124,8 +127,8 @@ class Cylinder(Shape):
     shape: Literal["cylinder"] = entry("cylinder, flat_rounded, plane or heights", "cylinder")
     radius: RoundingRadius = entry("relative radius, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
 
-    def height(self, x: Array, y: Array) -> Array:
-        return x**2 / (2.0 * self.radius)
+    def described(self) -> GapFunction:
+        return partial(shapes.cylinder, radius=self.radius)
 
 
 class FlatRounded(Shape):
@@ -137,9 +140,10 @@ class FlatRounded(Shape):
     half_width: Length = entry("half width of the flat [mm]", "4 mm")
     edge_radius: RoundingRadius = entry("radius of the parabola beyond the flat [mm]", "10 mm")
 
-    def height(self, x: Array, y: Array) -> Array:
-        beyond = np.maximum(np.abs(x) - self.half_width, 0.0)
-        return beyond**2 / (2.0 * self.edge_radius)
+    def described(self) -> GapFunction:
+        return partial(
+            shapes.rounded_flat, half_width=self.half_width, edge_radius=self.edge_radius
+        )
 
 
 class Heights(Bodies):

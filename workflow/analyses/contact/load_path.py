@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar
 import numpy as np
 from pydantic import model_validator
 
-from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
 from workflow.case.fields import File, Quantity, Whole
 from workflow.case.files.table_file import read_columns
 from workflow.case.sections import (
@@ -21,6 +20,7 @@ from workflow.case.sections import (
     sections_of,
 )
 from workflow.case.text.plain import between, plain
+from workflow.models.uncoupled.load_table import LoadTable, conflict
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual contact.
 NormalForce = Annotated[float, Quantity("N", at_least=0.0, at_most=1e9, range_text="0 to 1e6 kN")]
@@ -142,7 +142,7 @@ class LegsOrFile(Section, Generic[LegT]):
         if self.file is not None:
             return LoadTable(read_columns(self.file, quantities))
         targets = {key: [getattr(leg, key) for leg in self.legs] for key in quantities}
-        return LoadTable(ramps(targets, [leg.increments for leg in self.legs], self.closed))
+        return LoadTable.legs(targets, [leg.increments for leg in self.legs], self.closed)
 
     def ranges(self) -> Iterator[str]:
         """Yield the range of values of each load, with 0 included."""

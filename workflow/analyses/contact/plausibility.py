@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.analyses.contact.load_table import LoadTable
 from workflow.case.plausibility import pressed
 from workflow.case.sections import ElasticSection
 from workflow.case.text.plain import plain
+from workflow.models.uncoupled.load_table import LoadTable
 
 # Shear below this share of the friction limit is hardly intended.
 HARDLY = 1e-3

@@ -7,7 +7,7 @@ import numpy as np
 from sa_solver.contact_state import ContactState
 from sa_solver.cycles.history import ContactLoadPath, History, HistoryError, march_history
 from sa_solver.errors import ContactProblemError
-from workflow.analyses.contact.bodies import bodies_of, bulk_strain, half_space_of
+from workflow.analyses.contact.bodies import bodies_of, half_space_of
 from workflow.analyses.contact.case import BodiesCase, surface_warnings
 from workflow.analyses.contact.output.results import (
     ContactOutcome,
@@ -50,7 +50,7 @@ def _march(
     for warning in surface_warnings(case.structure, grid):
         reporter.warn(warning)
     height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
-    strain = bulk_strain(table, bodies_of(case))
+    strain = table.bulk_strain(bodies_of(case))
     passed: dict[int, ContactState] = {}
     cost: list[int] = []
     with reporter.course("contact"), reporter.stage("contact"):

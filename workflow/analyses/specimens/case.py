@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -97,12 +96,6 @@ class Specimens(Section):
         radii = None if self.form is None else (self.form.along, self.form.across)
         sizes = self.model_dump(exclude={"kind", "form", "surfaces"})
         return Specimen(**sizes, radii=radii, **settings)
-
-
-# A check of the case and the run that follows it share the mesh.
-@lru_cache(maxsize=1)
-def _meshed(specimen: Specimen, size: float) -> StructureMesh:
-    return specimen.mesh(size)
 
 
 class FrettingLoads(Section):
@@ -277,7 +270,9 @@ class SpecimensCase(WithScans, Case):
 
     def meshed(self) -> StructureMesh:
         """Return both specimens, meshed once, without measured surfaces. Raises MeshError."""
-        return _meshed(self.geometry(), self.mesh.size)
+        from workflow.models.specimens.reduced import meshed_specimens
+
+        return meshed_specimens(self.geometry(), self.mesh.size)
 
     @property
     def pad_grid(self) -> Grid:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 from fe_models.joints.reduced_contact import VirginCurve
 from sa_solver.types import Array
+from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState, PadHalfSpace
-from workflow.analyses.specimens.model import SpecimensModel
-from workflow.analyses.specimens.wear import BlockState
+from workflow.models.specimens.reduced import ReducedSpecimens
+from workflow.models.specimens.wear import BlockState
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,8 @@ class LoadOutcome:
 class SpecimensOutcome:
     """All results of a run of specimens."""
 
-    model: SpecimensModel
+    case: SpecimensCase
+    model: ReducedSpecimens
     half_space: PadHalfSpace
     bulk: BulkCompliance
     loads: tuple[LoadOutcome, ...]

@@ -27,8 +27,8 @@ from workflow.analyses.specimens.summary import (
     reported_summary,
     tied_pad,
 )
-from workflow.analyses.specimens.wear import BlockState
 from workflow.analyses.wear.output.datasets import kinetics_columns, mesh_of
+from workflow.models.specimens.wear import BlockState
 from workflow.shell.analysis import Run
 from workflow.shell.folders.store import replacing_hdf5
 from workflow.shell.output.results import ResultsWriter, run_results
@@ -143,7 +143,7 @@ def _state(kept: SpecimensState, areas: Array) -> dict[str, Array]:
 
 
 def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
-    model, wear = outcome.model, outcome.model.case.wear
+    model, wear = outcome.model, outcome.case.wear
     loads = [load_summary(outcome, load) for load in outcome.loads]
     for load in loads:
         if late(load):
@@ -154,7 +154,7 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
     coefficients = wear.body_1.rate(1.0), wear.body_2.rate(1.0)  # reports need laws of energy
     return {
         "structure": {"nodes": model.node_count(), "pad_nodes": len(model.face)},
-        **model.case.surfaces_summary(),
+        **outcome.case.surfaces_summary(),
         "frequencies": frequencies(outcome),
         "tied_pad": tied_pad(outcome.bulk),
         "explanation": explanation(outcome),

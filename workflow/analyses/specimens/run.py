@@ -7,7 +7,6 @@ directions of shear coupled, which the uncoupled method and Masing's rule neglec
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -20,12 +19,11 @@ from sa_solver.steps import Steps
 from sa_solver.types import Array, ElasticPair
 from wear.contact.link import LARGEST_RESIDUAL
 from wear.coupled_state import CoupledState, Observer
-from wear.steps.marching import rest
-from wear.steps.steppers import ExplicitStepper, StabilityError
+from wear.steps.steppers import StabilityError
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import HalfSpaceState, PadHalfSpace, bulk_compliance
 from workflow.analyses.specimens.memory import memory
-from workflow.analyses.specimens.model import SpecimensModel
+from workflow.analyses.specimens.model import fretted_specimens, reduced_pair
 from workflow.analyses.specimens.outcome import (
     LoadOutcome,
     MarchedCycle,
@@ -33,9 +31,10 @@ from workflow.analyses.specimens.outcome import (
     SpecimensState,
 )
 from workflow.analyses.specimens.results import write_specimens_output
-from workflow.analyses.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
 from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed, UserError
+from workflow.models.specimens.reduced import ReducedSpecimens
+from workflow.models.specimens.wear import BlockState
 from workflow.shell.analysis import Run
 from workflow.shell.few_cells import check_cells
 from workflow.shell.folders.steps import resumable_steps
@@ -56,9 +55,6 @@ QUARTER = 16
 WEAR = 0.7
 # First motion of the coupled cycle as a share of half the stroke: nearly all nodes stick.
 SMALL_MOTION = 1e-3
-# Limit on cycle blocks, each of which takes milliseconds: more are most likely an error in the
-# case.
-MOST_BLOCKS = 20_000
 
 
 @dataclass(frozen=True)
@@ -91,7 +87,7 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
 def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> SpecimensOutcome:
     for warning in case.surface_warnings():
         reporter.warn(warning)
-    model = SpecimensModel(case)
+    model = reduced_pair(case)
     with reporter.stage("mesh"):
         nodes = model.node_count()
     for finer in case.finer_than_nodes(FINER):
@@ -112,25 +108,28 @@ def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> Specimens
     forces = case.load_path.normal_forces
     with reporter.course("specimens"):
         loads = tuple(
-            _fret(model, half_space, force, reporter, steps)
+            _fret(case, model, half_space, force, reporter, steps)
             for force in reporter.parts(forces, "{:g} N".format)
         )
     with reporter.stage("half-space"):
         bulk = steps("tied pad", lambda: bulk_compliance(pair, half_space))
-    return SpecimensOutcome(model, half_space, bulk, loads)
+    return SpecimensOutcome(case, model, half_space, bulk, loads)
 
 
 def _fret(
-    model: SpecimensModel,
+    case: SpecimensCase,
+    model: ReducedSpecimens,
     half_space: PadHalfSpace,
     force: float,
     reporter: Reporter,
     steps: Steps,
 ) -> LoadOutcome:
-    case, pair = model.case, model.pair
-    conditions = FrettingConditions(force, case.load_path.stroke, case.friction.coefficient)
+    pair = model.pair
+    fretted = fretted_specimens(case, force)
+    conditions = fretted.conditions
     with reporter.part(0.0, WEAR), reporter.stage("wear"):
-        blocks = tuple(_blocks(model, conditions, reporter, steps))
+        reporter.doing(f"{force:g} N: the unworn cycle")
+        blocks = tuple(fretted.blocks(model, steps, [BlockProgress(reporter)]))
         curves = (
             steps("first loading", partial(first_loading, pair, state, conditions))
             for state in _chosen(blocks)
@@ -139,9 +138,13 @@ def _fret(
     grid = half_space.grid
     height = model.gap(grid)
     path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)
+    linked = pair if case.contact.link == "corrected" else None
     with reporter.stage("half-space"):
         first, last = (
-            steps("half-space", partial(_beside, model, half_space, height, force, path, state))
+            steps(
+                "half-space",
+                partial(_beside, linked, half_space, height, force, path, state),
+            )
             for state in (blocks[0], blocks[-1])
         )
     name = f"the half-space under {force:g} N"
@@ -164,88 +167,18 @@ def _fret(
 
 
 def _beside(
-    model: SpecimensModel,
+    linked: ReducedPair | None,
     half_space: PadHalfSpace,
     height: Array,
     force: float,
     path: Array,
     state: BlockState,
 ) -> HalfSpaceState:
-    """Return the half-space under the shape of a state, linked to the specimens if wanted."""
+    """Return the half-space under the shape of a state, linked to a pair of specimens if given."""
     link = None
-    if model.case.contact.link == "corrected":
-        link = half_space.link(model.pair, state.contact.normal, path)
+    if linked is not None:
+        link = half_space.link(linked, state.contact.normal, path)
     return half_space.fretting_cycle(height, state.depths.sum(axis=0), force, path, link)
-
-
-def _blocks(
-    model: SpecimensModel, conditions: FrettingConditions, reporter: Reporter, steps: Steps
-) -> Iterator[BlockState]:
-    """Return the states of a worn pair, up to the end that the case asks for."""
-    case = model.case
-    step = case.wear.step
-    stepper = (
-        ExplicitStepper(step.fraction)
-        if step.cycles is None
-        else ExplicitStepper(cycles=step.cycles)
-    )
-
-    def to_go(state: BlockState) -> float:
-        _check(state, conditions, case)
-        return _to_go(case, state)
-
-    fretted = FrettedPair(model.pair, case.laws, conditions, steps)
-    reporter.doing(f"{conditions.force:g} N: the unworn cycle")
-    observers = [BlockProgress(reporter)]
-    return wear_in_cycle_blocks(fretted, model.face.gap, stepper, to_go, observers)
-
-
-def _to_go(case: SpecimensCase, state: BlockState) -> float:
-    """Return the largest number of cycles of the block after ``state``; 0 at the end.
-
-    A run up to an energy ends with the first whole block that reaches it. Where nothing wears yet,
-    the block ends as soon as the energy is reached at the present rate.
-    """
-    wear = case.wear
-    if wear.cycles is not None:
-        return rest(wear.cycles, state.cycles)
-    assert wear.energy is not None
-    left = (wear.energy - state.energy) / state.contact.energy
-    block = _block(case, state)
-    return 0.0 if left <= 0.0 else max(left, block if np.isfinite(block) else 0.0)
-
-
-def _block(case: SpecimensCase, state: BlockState) -> float:
-    """Return the number of cycles of a whole block after ``state``."""
-    step = case.wear.step
-    return step.fraction * state.stable_cycles if step.cycles is None else step.cycles
-
-
-def _check(state: BlockState, conditions: FrettingConditions, case: SpecimensCase) -> None:
-    """Raise an error unless the state has converged and the run comes to an end."""
-    contact, force = state.contact, f"{conditions.force:g} N"
-    if not contact.converged:
-        raise MethodFailed(
-            f"contact at {force} did not converge after {state.cycles:.4g} cycles; change "
-            "mesh.pad_elements or lower wear.step.fraction"
-        )
-    if case.wear.energy is not None and contact.energy == 0.0:
-        raise UserError(
-            f"wear.energy: nothing slides at {force}, so this energy is never dissipated: raise "
-            "load_path.stroke or friction.coefficient, or give wear.cycles"
-        )
-    if state.wear.any() and np.isinf(state.stable_cycles):
-        raise UserError(
-            f"mesh.pad_elements: only one node of the pad touches at {force}, too few to wear: "
-            "raise it, or load_path.normal_forces"
-        )
-    # Number of blocks of the run if all are as long as the first one.
-    needed = state.number or _to_go(case, state) / _block(case, state)
-    if needed > MOST_BLOCKS:
-        raise UserError(
-            f"wear: more than {MOST_BLOCKS} cycle blocks at {force}: lower the wear coefficients, "
-            "the cycles or the energy, or lengthen wear.step"
-        )
 
 
 def _chosen(blocks: tuple[BlockState, ...]) -> list[BlockState]:

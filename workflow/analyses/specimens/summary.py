@@ -11,7 +11,7 @@ from sa_solver.types import Array
 from workflow.analyses.specimens.case import Reported
 from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState
 from workflow.analyses.specimens.outcome import LoadOutcome, SpecimensOutcome, SpecimensState
-from workflow.analyses.specimens.wear import BlockState
+from workflow.models.specimens.wear import BlockState
 
 # A quantity is steady while it stays within this value of its last one: relative to the stiffness,
 # and to the mean pressure.
@@ -34,7 +34,7 @@ def explanation(outcome: SpecimensOutcome) -> list[str]:
     """Return sentences on where specimens and half-space differ, and why."""
     bulk, first = outcome.bulk, outcome.loads[0]
     (stiff_z, stiff_x), (half_z, half_x) = bulk.specimens, bulk.half_space
-    ring = outcome.model.case.structure.ring_distance
+    ring = outcome.model.model.specimen.ring_distance
     unworn, beside = first.kept[0].block.contact.normal, first.half_space[0]
     shares = [edge_share(outcome.model.pair, p) for p in (unworn.pressure, beside.nodal_pressure)]
     softer = (

@@ -18,7 +18,6 @@ from fe_models.dynamics.transient.impact_hammer import (
 from sa_solver.steps import Steps
 from workflow.analyses.rig import excitation as given
 from workflow.analyses.time.case import RigCase, joules
-from workflow.analyses.time.joint import evolution_curve
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.motion import (
     motion_curves,
@@ -31,6 +30,7 @@ from workflow.analyses.time.outcome import State, TimeOutcome
 from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 from workflow.layout.declared import Arrays
+from workflow.models.rig.joint import evolution_curve
 from workflow.models.rig.rig_model import RigModel
 from workflow.shell.terminal.reporter import Reporter
 

@@ -13,11 +13,12 @@ from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig import joint_evolution as given
 from workflow.analyses.rig.joint_sections import BoucWenJoint, ElasticJoint, Joint
 from workflow.analyses.rig.laws import law_of, laws_of
-from workflow.analyses.time.case import TimeCase
+from workflow.analyses.time.case import JointCase, TimeCase
 from workflow.analyses.time.outcome import PARAMETERS
 from workflow.analyses.wear.output.loop_table import read_loop_table
 from workflow.errors import UserError
-from workflow.models.rig.laws import Law, Laws, LineLaw, law_of_all
+from workflow.models.rig.joint import WearingJoint, parameters_of
+from workflow.models.rig.laws import Law, Laws, law_of_all
 
 
 @dataclass(frozen=True)
@@ -43,24 +44,30 @@ class JointModel:
         """Return the joint of a case. Raises UserError where its table of loops cannot be used."""
         return cls(law_of(case.joint), _evolution(case), counts, laws_of(own))
 
-    @property
-    def line_law(self) -> LineLaw:
-        """Law of a joint alone, which has one direction."""
-        assert not isinstance(self.law, FrictionContact | ElasticLaw)
-        return self.law
-
     def at(self, energy: float) -> Laws:
         """Return the law of each joint after a dissipated ``energy`` of those that wear [N mm]."""
         return law_of_all(self._whole(energy), self.own, self.counts)
 
     def parameters(self, energy: float) -> dict[str, float]:
         """Return parameters after a dissipated ``energy`` [N mm], by name."""
-        law = self._whole(energy)
-        return {name: float(getattr(law, name)) for name in PARAMETERS if hasattr(law, name)}
+        return parameters_of(self._whole(energy))
 
     def _whole(self, energy: float) -> Law:
         law: Law = self.evolution.at(self.law, energy)
         return law
+
+
+def wearing_joint(case: JointCase) -> WearingJoint:
+    """Return the joint of a case that is a joint alone, with its drive.
+
+    Raises UserError where its table of loops cannot be used.
+    """
+    law = law_of(case.joint)
+    assert not isinstance(law, FrictionContact | ElasticLaw), "a law of one direction"
+    ageing = case.ageing
+    return WearingJoint(
+        law, _evolution(case), case.drive.stroke, ageing.cycles, ageing.energy, ageing.tolerance
+    )
 
 
 def _evolution(case: TimeCase) -> JointEvolution:

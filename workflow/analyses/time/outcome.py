@@ -8,27 +8,16 @@ from typing import Any
 
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.layout.declared import Arrays, Layout, declared
-from workflow.models.rig.layout import CURVES
+from workflow.models.rig import layout
 
-# The parameters of a joint that evolve, in the order of reports.
-_PARAMETERS = """
-    friction | 1 | energy | coefficient of friction
-    stiffness | N/mm | energy | slope of the stuck joint
-    residual_stiffness | N/mm | energy | slope of the sliding joint
-    normal_load | N | energy | normal load
-"""
-PARAMETERS = declared(_PARAMETERS)
+PARAMETERS = declared(layout.PARAMETERS)
 LAYOUT = Layout.read(
     f"""
-evolution
-    energy | N mm | energy | energy dissipated so far in the joint
-    cycles | 1 | energy | cycles so far
-    energy_per_cycle | N mm | energy | energy dissipated in a cycle
-    {_PARAMETERS}
+evolution{layout.EVOLUTION}
 states/<state>/loop
     displacement | mm | point | displacement of the joint, or the mean of several, in a cycle
     force | N | point | force that resists it
-states/<state>/motion{CURVES}
+states/<state>/motion{layout.CURVES}
     joints_displacement | mm | time entry | mean displacement of each entry of structure.joints
     joints_force | N | time entry | sum of the forces of each entry of structure.joints, resisting
 states/<state>/frequency_response

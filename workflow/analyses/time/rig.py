@@ -20,7 +20,7 @@ from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.structure import own_laws
 from workflow.analyses.time.case import Ageing, Integration, RigCase, joules
 from workflow.analyses.time.hammer import run_hammer
-from workflow.analyses.time.joint import aged, energies_within, evolution_curve, extracted, test_end
+from workflow.analyses.time.joint import aged, energies_within, extracted, test_end
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.memory import memory
 from workflow.analyses.time.motion import (
@@ -32,6 +32,7 @@ from workflow.analyses.time.motion import (
 )
 from workflow.analyses.time.outcome import State, TimeOutcome
 from workflow.errors import MethodFailed
+from workflow.models.rig.joint import evolution_curve
 from workflow.models.rig.rig_model import RigModel
 from workflow.shell.terminal.reporter import Reporter
 

@@ -34,7 +34,7 @@ from workflow.analyses.wear.structures.bodies.case import (
     Reciprocation,
     WearGrid,
 )
-from workflow.analyses.wear.structures.bodies.source import gap_of
+from workflow.analyses.wear.structures.bodies.model import gap_of
 from workflow.models.rig.rig_model import RigModel
 from workflow.models.vibration.excitation import Driving
 

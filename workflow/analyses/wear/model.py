@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.translation import contact_of, wear_of
+from workflow.analyses.wear.translation import model_with
 from workflow.case.sections import Case
 from workflow.errors import UserError
-from workflow.models.contact import Contact
 from workflow.models.wear import WearModel
 
 
@@ -21,9 +20,4 @@ def wear_model(case: Case) -> WearModel:
             "only the wear of contacts has such a model; allowed: cases of analysis wear of a "
             "dovetail, a mesh, resultants or bodies"
         )
-    names = case.contact_names
-    contacts: Contact | dict[str, Contact] = contact_of(case, names[0])
-    if len(names) > 1:
-        contacts = {name: contact_of(case, name) for name in names}
-    structure = structure_of(case).model(case)
-    return WearModel(structure, contacts, wear_of(case), case.stress.described())
+    return model_with(case, structure_of(case).model(case))

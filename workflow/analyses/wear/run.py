@@ -30,7 +30,7 @@ from workflow.analyses.wear.output.outcome import InterfaceOutcome, Outcome
 from workflow.analyses.wear.output.results import write_output
 from workflow.analyses.wear.recording import FileRecorder, RunLog, reported_stage
 from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.writing import marched
 from workflow.analyses.wear.translation import check_section
 from workflow.analyses.wear.worn.worn_structure import nonlinearity_sentence
@@ -96,8 +96,8 @@ def _compute(
         if isinstance(source, StructureLoads):
             assert isinstance(case, FiniteElementCase)
             _check_structure(case, source, reporter)
-        if isinstance(source, ResultantsSource):
-            warn_of_file(source, reporter)
+        if isinstance(case, ResultantsCase):
+            warn_of_file(case, reporter)
         with reporter.stage("contact set-up"):
             contacts = model.face_contacts(source)
             if in_workers:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import prod
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from workflow.analyses.wear.approximations.approximation import Neighbour
 from workflow.analyses.wear.case.base import WearCase
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from wear.contact.tractions import CycleTractions
     from workflow.models.contact import FaceContact
     from workflow.models.loads import LoadSource
-    from workflow.models.structure_model import StructureModel
+    from workflow.models.wear import Structure
 
 AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 
@@ -69,7 +69,7 @@ class WearStructure(Generic[AnyWearCase]):
 
     name: str
     case: type[AnyWearCase]
-    model: Callable[[AnyWearCase], StructureModel | LoadSource]
+    model: Callable[[AnyWearCase], Structure]
     extent: Callable[[AnyWearCase], Extent]
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
@@ -81,10 +81,8 @@ class WearStructure(Generic[AnyWearCase]):
 
     def source(self, case: AnyWearCase) -> LoadSource:
         """Return the loads of the contacts of a case."""
-        model = self.model(case)
-        if not hasattr(model, "meshed"):
-            return model
-        # Finite elements take a second to import, so they are imported only where they are used.
-        from workflow.analyses.wear.translation import structure_loads
+        # Solvers take a second to import, so they are imported only where they are used.
+        from workflow.analyses.wear.translation import model_with
+        from workflow.shell.folders.cache import DiskStore
 
-        return structure_loads(case, lambda _: cast("StructureModel", model))
+        return model_with(case, self.model(case)).loads(DiskStore())

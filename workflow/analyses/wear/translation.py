@@ -14,9 +14,19 @@ from workflow.models.contact import Contact, FaceContact, Wear, WearStepper
 from workflow.models.loads import ContactFace
 from workflow.models.structure import StructureLoads
 from workflow.models.structure_model import StructureModel
+from workflow.models.wear import Structure, WearModel
 from workflow.shell.folders.cache import DiskStore
 
 AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
+
+
+def model_with(case: WearCase, structure: Structure) -> WearModel:
+    """Return the model of a case with this structure: its contacts, how they wear and their stress."""
+    names = case.contact_names
+    contacts: Contact | dict[str, Contact] = contact_of(case, names[0])
+    if len(names) > 1:
+        contacts = {name: contact_of(case, name) for name in names}
+    return WearModel(structure, contacts, wear_of(case), case.stress.described())
 
 
 def contact_of(case: WearCase, name: str) -> Contact:

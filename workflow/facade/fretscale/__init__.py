@@ -12,7 +12,10 @@ Models in Python
     - ``DovetailJoint``, ``DovetailMesh``, ``Dovetail``, ``Mission``: the built-in blade root in its
       disk: the joint, its mesh, its section and its loads.
     - ``MeshAssembly``, ``LegPath``, ``TightenedBolt``: bodies of a mesh or CAD file under loads.
+    - ``BodyPair``, ``LoadTable``: a ball, cylinder or any gap under a cycle of forces and motions.
+    - ``GivenLoads``: contact faces with the resultants that another code has found.
     - ``UncoupledSource``, ``LoadSource``: base classes for user-defined loads of ``ContactFace`` s.
+    - ``SpecimenPair``, ``FrettedSpecimens``: crossed specimens of a friction rig, and their wear.
     - ``Contact``, ``CoulombFriction``: properties of a contact, and how it is computed.
     - ``Wear``, ``JumpSize``, ``Stop``: how far contacts wear, and in which steps.
     - ``Stress``: the stress of bodies and under contacts, and fretting life.
@@ -20,6 +23,7 @@ Models in Python
     - ``VibrationModel``: a rig with joints under periodic forces; ``run`` computes its motions.
     - ``vibration_model``: the model that a vibration case describes.
     - ``MotionModel``: a rig with joints in time; ``run`` integrates its motion under a force.
+    - ``WearingJoint``: a friction joint alone whose parameters change with dissipated energy.
     - ``RigModel``, ``FrequencySweep``: the rig, and the frequencies of its motions.
     - ``Observer``, ``Progress``, ``Checkpoint``: objects that are called while a model runs.
 
@@ -139,15 +143,22 @@ if TYPE_CHECKING:
     from workflow.models.dovetail import DovetailJoint, DovetailMesh
     from workflow.models.gaps import AddedGap
     from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
+    from workflow.models.rig.joint import WearingJoint
     from workflow.models.rig.motion import MotionModel
     from workflow.models.rig.rig_model import RigModel
+    from workflow.models.specimens.fretted import FrettedSpecimens
+    from workflow.models.specimens.reduced import SpecimenPair
     from workflow.models.stress.settings import Stress
+    from workflow.models.uncoupled.body_pair import BodyPair
+    from workflow.models.uncoupled.given_loads import GivenLoads
+    from workflow.models.uncoupled.load_table import LoadTable
     from workflow.models.vibration.model import VibrationModel
     from workflow.models.vibration.sweep import FrequencySweep
     from workflow.models.wear import WearModel
 
 __all__ = [
     "AddedGap",
+    "BodyPair",
     "CaseError",
     "Check",
     "Checkpoint",
@@ -163,10 +174,13 @@ __all__ = [
     "FittedParameter",
     "FrequencySweep",
     "FretscaleError",
+    "FrettedSpecimens",
+    "GivenLoads",
     "Group",
     "JumpSize",
     "LegPath",
     "LoadSource",
+    "LoadTable",
     "MainResult",
     "MeshAssembly",
     "MethodFailed",
@@ -179,6 +193,7 @@ __all__ = [
     "Progress",
     "Results",
     "RigModel",
+    "SpecimenPair",
     "Stop",
     "Stress",
     "TightenedBolt",
@@ -187,6 +202,7 @@ __all__ = [
     "VibrationModel",
     "Wear",
     "WearModel",
+    "WearingJoint",
     "check",
     "compare",
     "fit",

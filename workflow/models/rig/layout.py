@@ -1,4 +1,4 @@
-"""Declarations of the results of a motion."""
+"""Declarations of the results of a motion, and of a joint that wears."""
 
 from __future__ import annotations
 
@@ -11,3 +11,18 @@ CURVES = """
     dissipated | N mm | time | energy that the joint has dissipated since the beginning
 """
 """Declarations of the curves of a motion."""
+
+PARAMETERS = """
+    friction | 1 | energy | coefficient of friction
+    stiffness | N/mm | energy | slope of the stuck joint
+    residual_stiffness | N/mm | energy | slope of the sliding joint
+    normal_load | N | energy | normal load
+"""
+"""Declarations of the parameters of a joint that evolve, in the order of reports."""
+EVOLUTION = f"""
+    energy | N mm | energy | energy dissipated so far in the joint
+    cycles | 1 | energy | cycles so far
+    energy_per_cycle | N mm | energy | energy dissipated in a cycle
+    {PARAMETERS}
+"""
+"""Declarations of the curves over the energy that a joint has dissipated."""

@@ -100,6 +100,17 @@ class DiskStore:
         _save_cycle(name, cycle)
         return cycle
 
+    def arrays(
+        self, kind: str, key: tuple[object, ...], make: Callable[[], dict[str, Any]]
+    ) -> tuple[dict[str, Any], bool]:
+        """Return the named arrays of a kind and key, and whether they were stored."""
+        name = f"{kind}-{content_key(kind, *key)}"
+        if (stored := load_arrays(name)) is not None:
+            return stored, True
+        arrays = make()
+        save_arrays(name, arrays)
+        return arrays, False
+
 
 def _restored_joint(arrays: dict[str, Any], attributes: dict[str, Any]) -> JointResolvent:
     inverse: Array | SplitMatrix

@@ -9,7 +9,7 @@ from tests.conftest import CASES
 from wear.contact.interface import FirstContact
 from workflow.analyses.wear.checks.warnings import warn_of_contact
 from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.structures.resultants.model import given_loads
 from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case, parse_case, template
 from workflow.models.structure import StructureLoads
@@ -36,7 +36,7 @@ def begun(source, stage, loads):
 def of_file(folder: Path, energy: float):
     (folder / "loads.csv").write_text(ROWS.format(energy, energy), encoding="utf-8")
     case = parse_case(template("resultants"), str(folder / "case.yaml"), SETTINGS)
-    source = ResultantsSource(case)
+    source = given_loads(case)
     return case, *begun(source, face_contact(case, source.faces[0]), source.unworn()[0])
 
 

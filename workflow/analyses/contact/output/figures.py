@@ -11,9 +11,9 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Grid
-from workflow.analyses.contact.load_table import FORCES, MOTIONS
 from workflow.analyses.contact.output.layout import BODIES, ContactContents
 from workflow.case.text.readable import percent
+from workflow.models.uncoupled.load_table import FORCES, MOTIONS
 from workflow.pictures.fields import (
     FLAT,
     MARGIN,

@@ -12,7 +12,6 @@ from sa_solver.contact_state import ContactState
 from sa_solver.cycles.history import History
 from sa_solver.types import Array, Frame, Grid, Mask
 from workflow.analyses.contact.case import BodiesCase
-from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
 from workflow.analyses.contact.output.layout import BODIES, LAYOUT, ContactContents
 from workflow.analyses.contact.output.summary import (
     increments_errors,
@@ -23,6 +22,7 @@ from workflow.analyses.contact.output.summary import (
 )
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
+from workflow.models.uncoupled.load_table import FORCES, MOTIONS, LoadTable
 from workflow.shell.analysis import Run
 from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish

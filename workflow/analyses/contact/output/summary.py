@@ -13,7 +13,7 @@ from sa_solver.contact_state import ContactState
 from sa_solver.cycles.history import History
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Grid, Mask
-from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
+from workflow.models.uncoupled.load_table import FORCES, MOTIONS, LoadTable
 
 # A cell sticks where its shear is below µp by more than this share, which covers rounding.
 STICK_MARGIN = 1e-6

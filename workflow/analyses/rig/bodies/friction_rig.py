@@ -27,8 +27,8 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
     """
     with reporter.stage("reduction", "steps") as reported:
         key, file = "structure.specimens", rig.specimens
-        bodies = reduced_specimens(key, file, reporter, reported, rig.target_distance)
-    for finer in bodies.case.finer_than_nodes("no rig has more"):
+        case, bodies = reduced_specimens(key, file, reporter, reported, rig.target_distance)
+    for finer in case.finer_than_nodes("no rig has more"):
         reporter.say(finer)
     try:
         specimens = bodies.reduction.models

@@ -29,10 +29,11 @@ from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody, own_laws
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
-from workflow.analyses.specimens.model import SpecimensModel
+from workflow.analyses.specimens.model import reduced_pair
 from workflow.case.loading import load_case
 from workflow.errors import EntryError, UserError
 from workflow.models.rig.rig_model import JointEntry, JointNodes, RigModel
+from workflow.models.specimens.reduced import ReducedSpecimens
 from workflow.shell.terminal.reporter import Reporter
 
 AXES = "xyz"
@@ -240,7 +241,7 @@ def _reduced_body(
     assert isinstance(body, ReducedBody)
     if body.body is None:
         return body.stored(), ()
-    specimens = reduced_specimens("structure.file", body.file, reporter, progress)
+    _, specimens = reduced_specimens("structure.file", body.file, reporter, progress)
     return specimens.reduction.models[body.body - 1], ()
 
 
@@ -314,13 +315,13 @@ def reduced_specimens(
     reporter: Reporter,
     progress: Progress,
     target_distance: float | None = None,
-) -> SpecimensModel:
-    """Return the reduced specimens of the case in a ``file``; ``progress`` is called on the way.
+) -> tuple[SpecimensCase, ReducedSpecimens]:
+    """Return the case in a ``file`` and its reduced specimens; ``progress`` is called on the way.
 
     Raises UserError for a file that is not a specimens case, or for bodies that cannot be meshed.
     """
     case = load_case(file, [SpecimensCase])
-    model = SpecimensModel(case, target_distance)
+    model = reduced_pair(case, target_distance)
     try:
         memory(case, model.node_count()).check()
         model.prepare(progress)
@@ -328,7 +329,7 @@ def reduced_specimens(
         raise UserError(f"{key}: {file}: {error}") from error
     if model.from_cache:
         reporter.log("reduction: from the cache")
-    return model
+    return case, model
 
 
 # --- its points ---------------------------------------------------------------------------------

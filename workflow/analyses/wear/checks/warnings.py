@@ -16,12 +16,13 @@ from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.case.sections import SIZES, Duration
 from workflow.analyses.wear.output.link_report import report_link
 from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
 from workflow.models.contact import FaceContact, WornFaces, border_warnings
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
+from workflow.models.uncoupled.given_loads import GivenLoads
 from workflow.shell.few_cells import check_cells
 from workflow.shell.terminal.reporter import Reporter
 
@@ -123,13 +124,13 @@ def _mesh_size(face: Face) -> float:
     return float(np.median(face.facet_sizes if face.line else np.sqrt(2.0 * face.facet_sizes)))
 
 
-def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:
+def warn_of_file(case: ResultantsCase, reporter: Reporter) -> None:
     """Warn if the cycle of a loads file does not close, as far as the file says."""
-    closures = [imported.closure or 0.0 for imported in source.imported.values()]
+    closures = [imported.closure or 0.0 for imported in case.loads().values()]
     if max(closures) > CLOSED:
         reporter.warn(
-            f"structure.file: {source.file}: the cycle that feeds the wear is not closed: its "
-            f"contact forces differ from the cycle before by {percent(max(closures))} of the "
+            f"structure.file: {case.structure.file}: the cycle that feeds the wear is not closed: "
+            f"its contact forces differ from the cycle before by {percent(max(closures))} of the "
             "largest; compute more cycles there, and take the last"
         )
 
@@ -182,7 +183,7 @@ def _energies_differ(
     source: LoadSource, stage: FaceContact, loads: LoadHistory, first: FirstContact
 ) -> str:
     """Return the reason why source and half-space differ in energy, or an empty string."""
-    from_file, stated = isinstance(source, ResultantsSource), loads.mean_energy
+    from_file, stated = isinstance(source, GivenLoads), loads.mean_energy
     found, unit = float(first.energy.sum()), "N" if stage.grid.line else "N mm"
     if abs(found - stated) <= ENERGY_DIFFERENCE * max(found, stated):
         return ""

@@ -9,16 +9,16 @@ import numpy as np
 from workflow.analyses.wear.run_time import Extent
 from workflow.analyses.wear.structure import WearStructure
 from workflow.analyses.wear.structures.bodies.case import (
-    SHIFTS,
     BodiesWearCase,
     LineBodiesWearCase,
     TwoBodiesWearCase,
 )
+from workflow.models.uncoupled.load_table import SHIFTS
 
 if TYPE_CHECKING:
     from wear.contact.interface import InterfaceState
     from wear.contact.tractions import CycleTractions
-    from workflow.models.loads import LoadSource
+    from workflow.models.uncoupled.body_pair import BodyPair
 
 # Slip path in a cycle of a contact under shear forces, for the estimate of run times [mm].
 PARTIAL_SLIP = 5e-3
@@ -26,10 +26,10 @@ PARTIAL_SLIP = 5e-3
 SPLIT_INTO = 32
 
 
-def _source(case: TwoBodiesWearCase) -> LoadSource:
-    from workflow.analyses.wear.structures.bodies.source import BodiesSource
+def _model(case: TwoBodiesWearCase) -> BodyPair:
+    from workflow.analyses.wear.structures.bodies.model import body_pair
 
-    return BodiesSource(case)
+    return body_pair(case)
 
 
 def _extent(case: TwoBodiesWearCase) -> Extent:
@@ -65,7 +65,7 @@ STRUCTURE, LINE_STRUCTURE = (
     WearStructure(
         name=name,
         case=case,
-        model=_source,
+        model=_model,
         extent=_extent,
         choose=_choose,
         finer_cycles=_finer_cycles,

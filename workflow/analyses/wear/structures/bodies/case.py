@@ -7,13 +7,15 @@ case, though both are written ``analysis: wear`` and ``kind: bodies``.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from math import inf
 from typing import Annotated, Any, ClassVar, Generic, Literal, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from sa_solver.types import Array, Grid, Tilt
+from sa_solver.surfaces import shapes
+from sa_solver.types import Grid, Tilt
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.case import (
     HEIGHTS,
@@ -35,7 +37,6 @@ from workflow.analyses.contact.case import (
     unworn_contact,
 )
 from workflow.analyses.contact.load_path import Leg, LegsOrFile, LegT, LineLeg
-from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.plausibility import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.surfaces import KEY
 from workflow.analyses.wear.case.base import WearCase
@@ -47,6 +48,8 @@ from workflow.case.plausibility import heights, long_stroke
 from workflow.case.sections import GridCells, Length, LineCells, Section, Title, disagreement, entry
 from workflow.case.source import Source
 from workflow.case.text.plain import plain, shares
+from workflow.models.gaps import GapFunction
+from workflow.models.uncoupled.load_table import SHIFTS, LoadTable
 
 PressingLineForce = Annotated[
     float, Quantity("N/mm", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN/mm")
@@ -60,9 +63,6 @@ Accuracy = Annotated[float, Quantity("1", at_least=1e-6, at_most=1.0)]
 # Name of the only contact.
 NAME = "interface"
 FLAT = "flat"
-SHIFTS = "shift_x", "shift_y"
-# Loads that shear a contact other than by moving all of it.
-SHEARING = {"Qx", "Qy", "Mz", "twist", "bulk_stress_1", "bulk_stress_2"}
 TILTS = "tilt of the bodies: held: as they are placed; free: as no moment leaves them"
 
 # --- bodies -------------------------------------------------------------------------------------
@@ -80,9 +80,9 @@ class Flat(Shape):
         default=0.1,
     )
 
-    def height(self, x: Array, y: Array) -> Array:
-        on_top = (np.abs(x) < self.half_width) & (np.abs(y) < self.half_length)
-        return np.where(on_top, 0.0, self.step)
+    def described(self) -> GapFunction:
+        sizes = self.model_dump(include={"half_width", "half_length", "step"})
+        return partial(shapes.rectangle, **sizes)
 
 
 class FlatStrip(Shape):
@@ -92,8 +92,8 @@ class FlatStrip(Shape):
     half_width: Length = entry("half width of the strip, along x [mm]", "0.5 mm")
     step: Length = entry("height of the strip above the body [mm]", "0.1 mm", default=0.1)
 
-    def height(self, x: Array, y: Array) -> Array:
-        return np.where(np.abs(x) < self.half_width, 0.0, self.step)
+    def described(self) -> GapFunction:
+        return partial(shapes.strip, half_width=self.half_width, step=self.step)
 
 
 BodiesOfArea = Annotated[Sphere | Ellipsoid | Flat | Plane | Heights, Field(discriminator="shape")]
@@ -102,30 +102,6 @@ BodiesOfLine = Annotated[
 ]
 
 # --- loads --------------------------------------------------------------------------------------
-
-
-def with_held(path: LoadPath | LineLoadPath) -> LoadTable:
-    """Return the loads of every increment of a cycle, with motions of 0 for what is held."""
-    given = path.table()
-    held = ["twist"] if "Mz" not in given.columns else []
-    if path.tilt == "held":
-        pairs = {"Mx": "tilt_x", "My": "tilt_y"}.items()
-        held += [motion for moment, motion in pairs if moment not in given.columns]
-    return LoadTable({name: np.zeros(len(given)) for name in held} | given.columns)
-
-
-def to_and_fro(P: float, stroke: float, increments: int, angle: float = 0.0) -> LoadTable:
-    """Return the increments of a stroke there and back, at ``angle`` from x to y.
-
-    Motions are those of body 1 relative to body 2. The bodies meet in the middle of the stroke: a
-    contact in partial slip depends on where it first moved, and its loop would be off centre if the
-    bodies met at one end.
-    """
-    step = stroke / increments * np.array([np.cos(angle), np.sin(angle)])
-    there = np.tile(step, (increments, 1))
-    path = np.cumsum(np.concatenate([there, -there]), axis=0)
-    x, y = (0.5 * increments * step - path).T
-    return LoadTable({"P": np.full(len(path), P), "shift_x": x, "shift_y": y})
 
 
 class Stroke(Section):
@@ -147,7 +123,7 @@ class Reciprocation(Stroke):
 
     def table(self) -> LoadTable:
         """Return every increment of the cycle."""
-        return to_and_fro(self.P, self.stroke, self.increments, self.direction)
+        return LoadTable.stroke(self.P, self.stroke, self.increments, self.direction)
 
 
 class LineReciprocation(Stroke):
@@ -162,7 +138,7 @@ class LineReciprocation(Stroke):
 
     def table(self) -> LoadTable:
         """Return every increment of the cycle."""
-        return to_and_fro(self.P, self.stroke, self.increments)
+        return LoadTable.stroke(self.P, self.stroke, self.increments)
 
 
 class ClosedCycle(LegsOrFile[LegT], Generic[LegT]):
@@ -369,15 +345,12 @@ def _check(case: TwoBodiesWearCase) -> None:
     if isinstance(path, Stroke):
         return
     given = table.columns
-    if case.contact.method == "normal":
-        forces = sorted(given.keys() & SHEARING)
-        if forces or not given.keys() & SHIFTS:
-            wrong = f"has {', '.join(forces)}" if forces else "moves nothing along the face"
-            raise disagreement(
-                f"normal lets every cell slide by the whole motion, but load_path {wrong}; "
-                f"allowed: full, or no more than {', '.join(SHIFTS)} along the face",
-                "contact.method",
-            )
+    if case.contact.method == "normal" and (wrong := table.unfit_for_sliding):
+        raise disagreement(
+            f"normal lets every cell slide by the whole motion, but load_path {wrong}; "
+            f"allowed: full, or no more than {', '.join(SHIFTS)} along the face",
+            "contact.method",
+        )
     tilted = sorted(given.keys() & {"approach", "tilt_x", "tilt_y"})
     if case.loops.wanted and (tilted or (path.tilt == "held" and given.keys() & {"Mx", "My"})):
         raise disagreement(

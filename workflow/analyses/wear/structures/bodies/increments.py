@@ -25,7 +25,7 @@ from wear.steps.stepping import ContactFailure
 from workflow.analyses.contact.load_path import Leg, LineLeg
 from workflow.analyses.wear.choice import Decision, record_of
 from workflow.analyses.wear.structures.bodies.case import Stroke, TwoBodiesWearCase
-from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.analyses.wear.structures.bodies.model import source_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.changing import changed
 from workflow.case.text.readable import percent
@@ -79,7 +79,7 @@ def finer_cycles(case: TwoBodiesWearCase, state: InterfaceState) -> list[CycleTr
 
 
 def _contact(case: TwoBodiesWearCase, parts: int) -> tuple[InterfaceContact, Any]:
-    source = BodiesSource(case, parts)
+    source = source_of(case, parts)
     (face,), (loads,) = source.faces, source.unworn()
     return face_contact(case, face).contact, loads
 

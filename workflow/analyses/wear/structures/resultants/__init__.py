@@ -13,13 +13,13 @@ from workflow.analyses.wear.structure import WearStructure
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 
 if TYPE_CHECKING:
-    from workflow.models.loads import LoadSource
+    from workflow.models.uncoupled.given_loads import GivenLoads
 
 
-def _source(case: ResultantsCase) -> LoadSource:
-    from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+def _model(case: ResultantsCase) -> GivenLoads:
+    from workflow.analyses.wear.structures.resultants.model import given_loads
 
-    return ResultantsSource(case)
+    return given_loads(case)
 
 
 def _extent(case: ResultantsCase) -> Extent:
@@ -31,7 +31,7 @@ def _extent(case: ResultantsCase) -> Extent:
 STRUCTURE = WearStructure(
     name="resultants",
     case=ResultantsCase,
-    model=_source,
+    model=_model,
     extent=_extent,
     settings=lambda _: {
         "link": "displacements of the nodes in structure.file",
