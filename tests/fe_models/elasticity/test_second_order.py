@@ -130,7 +130,7 @@ def test_torn_edges_are_refused(found):
         with_midsides(same_bodies(found), torn)
 
 
-def test_faces_whose_midsides_are_apart_are_told():
+def test_faces_whose_midsides_are_apart_give_a_warning():
     mesh = curved_cubes()
     assert distance_of_midsides(mesh.interfaces[0], mesh.bodies) == 0.0
     lower, upper = mesh.bodies

@@ -79,7 +79,7 @@ def test_a_sphere_through_its_nodes_or_midsides(known: bool, left: float):
     assert (surface.form_error is None) is known
 
 
-def test_beside_the_face_nothing_is_known():
+def test_outside_the_face_the_surface_is_unknown():
     points, facets = circle()
     x = np.array([-2.0, 0.0, 2.0])[:, None]
     height = Surface.of(points, facets, None).over(points[:, :2], facets, x, ROW)

@@ -261,7 +261,7 @@ def test_flat_file_without_sets(tmp_path):
     assert list(read(tmp_path, CUBES).bodies) == ["body_1"]
 
 
-def test_edges_beside_solids_are_a_node_set(tmp_path):
+def test_edges_next_to_solids_are_a_node_set(tmp_path):
     text = CUBES + "*Element, type=T3D2, elset=Edge\n20, 11, 12\n21, 12, 13\n"
     imported = read(tmp_path, text)
     numbers = imported.node_numbers["body_1"][imported.points["body_1"]["Edge"]]

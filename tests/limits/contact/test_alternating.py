@@ -71,7 +71,7 @@ def test_it_converges_for_all_real_materials_up_to_a_friction_of_one(build):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("build", BODIES)
-def test_it_fails_beyond_and_says_so(build):
+def test_it_fails_beyond_with_a_message(build):
     state = in_turns(build, 2.8, 0.5, share=0.95, rounds=30)
     assert not state.converged
     assert "solve both together" in state.message

@@ -144,7 +144,7 @@ def test_profiles_of_two_materials_contradict_each_other():
         ({"x": PLACES[:4], "depth": np.ones(4)}, "scan: 4 points, which coefficient, shift"),
     ],
 )
-def test_scans_that_say_nothing_are_refused(change, words):
+def test_scans_without_information_are_refused(change, words):
     entries = {"name": "scan", "x": PLACES, "depth": cylinder(UNIT), "runs": runs(1.0)}
     with pytest.raises(FitError, match=words):
         scar_problem([ScarData(**{**entries, **change})])

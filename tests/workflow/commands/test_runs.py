@@ -1,17 +1,13 @@
 """Many runs in folders are computed once, resumed, and independent of each other's failures."""
 
-import json
 import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import h5py
-import numpy as np
 import pytest
 
 from tests.workflow.command_line import jobs_here
@@ -22,9 +18,7 @@ from workflow.kinds import load_case
 from workflow.runs import job as runs_job
 from workflow.runs.job import Job
 from workflow.runs.jobs import run_jobs
-from workflow.runs.provenance import provenance_of
 from workflow.runs.run import stored_run
-from workflow.shell.folders.folder import OutputFolder
 
 QUIET = "output: {paraview: false, figures: false}\n"
 # Jumps of some hundredths of a second each, so that a moment among them is easily met.
@@ -105,25 +99,12 @@ def test_a_finished_run_stays_and_another_case_takes_its_place(contact, here, tm
     assert changed.summary["states"][-1]["P"] == pytest.approx(500.0, rel=1e-6)
 
 
-def test_case_in_the_words_of_another_version_is_the_same(contact, here, tmp_path):
-    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
-    case = done.folder / "case.yaml"
-    case.write_text(case.read_text("utf-8").replace("#", "# formerly:"), encoding="utf-8")
-    assert stored_run(done.folder, load_case(contact)) == "finished"
-
-
 def test_what_is_no_run_is_left_alone(contact, here, tmp_path):
     figures = tmp_path / "out/mine/figures"
     figures.mkdir(parents=True)
     (done,) = run_jobs([Job("mine", contact)], tmp_path / "out")
     assert "not empty and no run of fretscale" in done.error
     assert figures.exists()
-
-
-@pytest.mark.parametrize("names", [["a", "a"], ["a/b"], [".."], [""]])
-def test_names_are_folders_of_their_own(contact, tmp_path, names):
-    with pytest.raises(ValueError, match="name"):
-        run_jobs([Job(name, contact) for name in names], tmp_path / "out")
 
 
 @pytest.mark.parametrize(
@@ -141,15 +122,6 @@ def test_a_process_that_ends_early_is_a_failure(contact, tmp_path, monkeypatch, 
     assert reported in done.error
 
 
-@pytest.mark.slow
-def test_a_mistake_of_the_program_leaves_its_traceback_in_the_log(contact, tmp_path, monkeypatch):
-    code = "import workflow.analyses.contact.run as c; c.bodies_of = None;" + runs_job.COMMAND
-    monkeypatch.setattr(runs_job, "COMMAND", code)
-    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
-    assert done.error == "TypeError: 'NoneType' object is not callable"
-    assert "Traceback" in (done.folder / "run.log").read_text("utf-8")
-
-
 def test_jobs_have_one_thread_each(contact, tmp_path, monkeypatch):
     names = list(runs_job.THREAD_SETTINGS)
     for name in names:
@@ -158,12 +130,6 @@ def test_jobs_have_one_thread_each(contact, tmp_path, monkeypatch):
     monkeypatch.setattr(runs_job, "COMMAND", code)
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     assert done.error.endswith(f"SystemError: {['1'] * len(names)}")
-
-
-def test_a_run_takes_a_core_for_each_of_its_contacts(dovetail_path, contact, wear):
-    assert load_case(dovetail_path).cores == 2
-    assert load_case(contact).cores == 1
-    assert load_case(wear).cores == 1
 
 
 def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
@@ -286,29 +252,6 @@ def test_whoever_is_killed_leaves_a_run_to_take_up(wear, tmp_path):
     assert without_times(taken_up.summary)["kinetics"] == untouched.summary["kinetics"]
 
 
-def test_a_damaged_state_is_started_again(wear, here, tmp_path):
-    job = Job("one", wear)
-    (done,) = run_jobs([job], tmp_path / "out")
-    folder = OutputFolder(done.folder)
-    folder.summary.unlink()
-    folder.checkpoint.write_bytes(folder.checkpoint.read_bytes()[:1000])
-    assert stored_run(done.folder, job.load()) == "nothing"
-    (again,) = run_jobs([job], tmp_path / "out")
-    assert without_times(again.summary) == without_times(done.summary)
-
-
-def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, here, tmp_path):
-    """The folder's case has the settings chosen by fidelity, and its record lists them."""
-    job = Job("one", wear)
-    (done,) = run_jobs([job], tmp_path / "out")
-    folder = OutputFolder(done.folder)
-    record = {"choice": {"chosen": {"contact.grid": [32, 8]}}}
-    folder.finish(done.summary | record, provenance_of(folder, job.load()))
-    asked = load_case(wear, ("contact.grid=[64, 16]",))
-    assert stored_run(done.folder, asked) == "finished"
-    assert stored_run(done.folder, load_case(wear, ("friction.coefficient=0.6",))) == "other"
-
-
 # --- a cluster ------------------------------------------------------------------------------------
 
 
@@ -321,26 +264,6 @@ def test_no_scheduler_is_one_line(contact, tmp_path, monkeypatch):
         run_jobs([Job("one", contact)], tmp_path / "out", dask="tcp://127.0.0.1:9")
 
 
-@pytest.mark.slow
-@posix_only
-def test_a_scheduler_that_is_killed_is_one_line(contact, tmp_path, caplog):
-    pytest.importorskip("distributed")
-    file = tmp_path / "scheduler.json"
-    module = "distributed.cli.dask_scheduler"
-    options = "--port=0", "--no-dashboard", f"--scheduler-file={file}"
-    scheduler = subprocess.Popen([sys.executable, "-m", module, *options], stderr=subprocess.PIPE)
-    try:
-        address = json.loads(wait_until(lambda: file.exists() and file.read_text()))["address"]
-        threading.Timer(1.0, scheduler.kill).start()
-        # No worker is there to take the run before.
-        with pytest.raises(MethodFailed, match=r"the scheduler has gone, 1 of 1 runs"):
-            run_jobs([Job("one", contact)], tmp_path / "out", dask=address)
-    finally:
-        scheduler.kill()
-        scheduler.communicate()
-    assert not caplog.records
-
-
 @pytest.fixture
 def impatient(monkeypatch):
     """Use seconds instead of minutes and hours."""
@@ -351,24 +274,8 @@ def impatient(monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_first_worker_may_come_late(contact, tmp_path, impatient, caplog):
-    """The wait for it is longer than that for lost workers, since a queue may be long."""
-    distributed = pytest.importorskip("distributed")
-    options = {"n_workers": 0, "processes": False, "dashboard_address": None}
-    with distributed.LocalCluster(**options) as cluster:
-        threading.Timer(5.0, cluster.scale, (1,)).start()
-        address = cluster.scheduler_address
-        (done,) = run_jobs([Job("one", contact)], tmp_path / "out", dask=address)
-    assert not done.error
-    (reported,) = (
-        record.getMessage() for record in caplog.records if record.name[:8] == "workflow"
-    )
-    assert reported.startswith(f"--dask {address}: no worker yet, 1 of 1 runs wait for one")
-
-
-@pytest.mark.slow
 @posix_only
-def test_workers_that_have_all_gone_are_told_and_given_up(wear, tmp_path, impatient, caplog):
+def test_a_run_fails_if_all_workers_have_gone(wear, tmp_path, impatient, caplog):
     """Their stored states remain, so that runs can be resumed."""
     distributed = pytest.importorskip("distributed")
     out = tmp_path / "out"
@@ -400,55 +307,3 @@ def test_a_cluster_finds_what_local_processes_find(contact, tmp_path):
     here = run_jobs(jobs, tmp_path / "here")
     assert without_times(there[0].summary) == without_times(here[0].summary)
     assert "friction cannot carry" in there[1].error
-
-
-@pytest.mark.slow
-@pytest.mark.long
-@posix_only
-@pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
-def test_a_worker_killed_at_work_changes_nothing(contact, wear, tmp_path):
-    """One of two workers is killed; all runs end with the bits of local processes."""
-    distributed = pytest.importorskip("distributed")
-    coefficients = [f"wear.body_1.coefficient={value} um^3/J" for value in (5e3, 1e4, 2e4)]
-    jobs = [
-        Job(f"run{number}", wear, (MANY, "wear.cycles=4e4", entry))
-        for number, entry in enumerate(coefficients)
-    ]
-    jobs.append(Job("slides", contact, ("load_path.legs.0.P=100 N",)))
-    out, reported = tmp_path / "cluster", []
-    cluster = distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-    )
-    with cluster, ThreadPoolExecutor() as beside:
-        workers = [nanny.pid for nanny in cluster.workers.values()]
-        killed = beside.submit(kill_at_work, workers, out / "run0")
-        results = run_jobs(jobs, out, dask=cluster.scheduler_address, report=reported.append)
-        assert killed.result() in workers
-    # Whether there was a state to go on from, the clock decides; it was taken over once.
-    assert (out / "run0/run.log").read_text("utf-8").count("is gone and left its lock") == 1
-    assert len(reported) == len(jobs)
-    for one, other in zip(results, run_jobs(jobs, tmp_path / "here"), strict=True):
-        if one.job.name == "slides":
-            assert "friction cannot carry" in one.error
-            assert "friction cannot carry" in other.error
-            continue
-        assert one.summary["kinetics"] == other.summary["kinetics"], one.error or other.error
-        np.testing.assert_array_equal(surfaces(one.folder), surfaces(other.folder))
-
-
-def kill_at_work(workers, folder):
-    """Kill the worker that runs the job of the folder, after some jumps."""
-    wait_until((folder / "jumps/00005.h5").exists)
-    for worker in workers:
-        commands = [Path(f"/proc/{pid}/cmdline").read_text() for pid in below(worker)]
-        if any(f'"{folder.name}"' in command for command in commands):
-            os.kill(worker, signal.SIGKILL)
-            return worker
-    return None
-
-
-def surfaces(folder):
-    """Return both surfaces of all jumps, ``(jumps, 2, nx)``."""
-    with h5py.File(folder / "results.h5") as file:
-        jumps = file["surfaces/interface"].values()
-        return np.array([[jump[f"body_{body}"][()] for body in (1, 2)] for jump in jumps])

@@ -13,13 +13,11 @@ import pytest
 from tests.marks import slow
 from tests.workflow.command_line import runs_here
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
-from workflow.errors import MethodFailed, NotWritten
+from workflow.errors import NotWritten
 from workflow.kinds import load_case
-from workflow.layout.declared import Layout
 from workflow.runs.run import resume_run, run_case
 from workflow.shell.folders import store
-from workflow.shell.folders.store import read_arrays, replacing, write_arrays, write_text
-from workflow.shell.output.results import writing
+from workflow.shell.folders.store import write_arrays
 
 # Seconds within which a command has ended.
 PATIENCE = 120.0
@@ -51,36 +49,7 @@ def ball(tmp_path):
     return path
 
 
-@pytest.fixture
-def synced(monkeypatch):
-    """Record the order in which files are flushed to disk and renamed."""
-    reported = []
-    fsync, rename = os.fsync, Path.replace
-
-    def syncing(file):
-        reported.append(("synced", Path(f"/proc/self/fd/{file}").readlink().name))
-        fsync(file)
-
-    def renaming(path, target):
-        reported.append(("renamed", path.name))
-        return rename(path, target)
-
-    monkeypatch.setattr(os, "fsync", syncing)
-    monkeypatch.setattr(Path, "replace", renaming)
-    return reported
-
-
 # --- what writes files ----------------------------------------------------------------------------
-
-
-@pytest.mark.skipif(not Path("/proc").exists(), reason="looks for names in /proc")
-def test_files_are_on_the_disk_before_they_have_their_name(synced, tmp_path):
-    write_text(tmp_path / "a.txt", "text")
-    write_arrays(tmp_path / "b.h5", ARRAYS)
-    assert [what for what, _ in synced] == ["synced", "renamed"] * 2
-    assert all(
-        first[1] == second[1] for first, second in zip(synced[::2], synced[1::2], strict=True)
-    )
 
 
 class Full:
@@ -110,22 +79,6 @@ def test_hdf5_on_a_full_disk_is_an_error_and_no_crash(room, monkeypatch, tmp_pat
     assert raised.value.filename == str(path)
     assert names(tmp_path) == ["a.h5"]
     assert path.read_text() == "old"
-
-
-def test_hdf5_through_the_outlet_is_read_back(tmp_path):
-    write_arrays(tmp_path / "a.h5", ARRAYS, {"title": "all"})
-    arrays, attributes = read_arrays(tmp_path / "a.h5")
-    np.testing.assert_equal(arrays, ARRAYS)
-    assert attributes == {"title": "all"}
-
-
-def test_an_error_of_whoever_writes_is_told_as_it_is(tmp_path):
-    with pytest.raises(MethodFailed, match="mine"), writing(tmp_path / "a.h5", Layout({})):
-        raise MethodFailed("mine")
-    with pytest.raises(FileNotFoundError) as raised, replacing(tmp_path / "a.txt"):
-        (tmp_path / "other.txt").read_text()
-    assert raised.value.filename == str(tmp_path / "other.txt")
-    assert names(tmp_path) == []
 
 
 # --- runs -----------------------------------------------------------------------------------------
@@ -203,54 +156,3 @@ def test_output_that_cannot_be_written_is_one_line(arguments):
         ending = command(*arguments, stdout=full)
     assert ending.returncode == 3
     assert ending.stderr == "fretscale: output: No space left on device\n"
-
-
-@linux_only
-def test_nothing_is_said_where_nothing_can_be(ball, tmp_path):
-    with FULL.open("w") as full:
-        assert command("no-such-command", stderr=full).returncode == 2
-        ending = command("run", ball, "--out", tmp_path / "out", stdout=full, stderr=full)
-    assert ending.returncode == 3
-    assert "case.yaml" in names(tmp_path / "out")
-    assert not (tmp_path / "out/summary.json").exists()
-
-
-@posix_only
-@pytest.mark.parametrize("arguments", [["schema"], slow(["--help"])])
-def test_who_stops_reading_has_had_enough(arguments):
-    """A reader such as `head` may close the output without an error message."""
-    read, write = os.pipe()
-    os.close(read)
-    ending = command(*arguments, stdout=write)
-    os.close(write)
-    assert ending.returncode == 3
-    assert ending.stderr == ""
-
-
-@posix_only
-@pytest.mark.parametrize(
-    "arguments", [["check"], slow(["new"]), slow(["materials"]), slow(["schema"]), ["--help"]]
-)
-def test_output_that_nobody_wants_is_left_out(arguments, ball):
-    """With >&- there is no stdout at all."""
-    closed = f"import os; os.close(1); {COMMAND}"
-    if arguments == ["check"]:
-        arguments = ["check", ball]
-    ending = command(*arguments, code=closed)
-    assert (ending.returncode, ending.stderr) == (0, "")
-
-
-@pytest.mark.slow
-@posix_only
-def test_a_run_that_nobody_listens_to_ends_and_is_repeated(ball, tmp_path):
-    read, write = os.pipe()
-    os.close(read)
-    arguments = "run", ball, "--out", tmp_path / "out"
-    ending = command(*arguments, stdout=write, stderr=write)
-    os.close(write)
-    assert ending.returncode == 3
-    assert names(tmp_path / "out") == ["case.yaml", "manifest.json", "run.log"]
-    # Without any stream: libraries print into no file of the run.
-    closed = f"import os; [os.close(number) for number in range(3)]; {COMMAND}"
-    assert command(*arguments, code=closed).returncode == 0
-    assert (tmp_path / "out/summary.json").exists()

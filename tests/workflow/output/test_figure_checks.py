@@ -3,10 +3,9 @@
 ``figure_checks`` defines the requirements.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import h5py
 import pytest
@@ -24,7 +23,6 @@ from workflow.analyses.wear.figures.wear import figures_of
 from workflow.analyses.wear.output.layout import WearContents
 from workflow.chart import figures as chart_figures
 from workflow.commands import loops_figure
-from workflow.pictures.panels import change, changes, plain_ticks
 from workflow.pictures.style import DOTS_PER_INCH, STYLE
 from workflow.sweep import figures as sweep_figures
 from workflow.sweep.table import varied_in
@@ -97,42 +95,6 @@ def test_figures_of_wear(size, names, shape, monkeypatch, tmp_path):
     assert {name: what for name, what in found.items() if what} == {}
 
 
-def change_results(path: Path, how: Callable[[h5py.File], Any]) -> Path:
-    with h5py.File(path, "a") as file:
-        how(file)
-    return path
-
-
-def test_nothing_dissipated_has_no_panel_and_no_percentage(results: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "results.h5"
-    copy.write_bytes(results.read_bytes())
-
-    def still(file: h5py.File) -> None:
-        for name in file["grid"]:
-            for column in ("Edx", "Edy"):
-                file[f"structure/{name}/load_history/{column}"][...] = 0.0
-            file[f"contact/{name}/energy_half_space"][...] = 1e-12
-
-    change_results(copy, still)
-    with h5py.File(copy) as file:
-        figure = figures_of(conftest.CONTENTS)["resultants"](file)
-    assert len(figure.axes) == 4
-    assert not any("%" in axis.get_title(loc="left") for axis in figure.axes)
-    assert not {"worn_profiles", "kinetics"} & set(
-        figures_of(replace(conftest.CONTENTS, worn=False))
-    )
-
-
-def test_loads_of_a_file_are_not_called_finite_elements(results: Path) -> None:
-    contents = replace(conftest.CONTENTS, structure=False, comparison=False)
-    with h5py.File(results) as file:
-        for name in ("resultants", "pressure_profiles"):
-            figure = figures_of(contents)[name](file)
-            words = [text.get_text() for text in figure.legends[0].get_texts()]
-            words += [axis.get_title(loc="left") for axis in figure.axes]
-            assert not any("finite elements" in word for word in words)
-
-
 @pytest.mark.slow
 def test_figures_of_sweeps_charts_and_loops() -> None:
     rows = [worn(depth) for depth in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)]
@@ -149,24 +111,3 @@ def test_figures_of_sweeps_charts_and_loops() -> None:
         loops_figure.figure(loops, "a_measurement_with_a_name_that_is_rather_long.csv"),
     ]
     assert [what for figure in drawn for what in wrong(figure)] == []
-
-
-def test_changes_from_nearly_nothing_are_told_in_their_unit() -> None:
-    assert change(2.0, 3.0, "mJ") == "+50.0%"
-    assert change(1e-6, 3.0, "mJ") == "1e-06 → 3 mJ"
-    assert change(0.0, 3.0, "mJ") == "0 → 3 mJ"
-    many = {f"face {number}": [1.0, float(number)] for number in range(5)}
-    assert changes(many, ".0f", " MPa") == "most on face 4 1 → 4 MPa"
-
-
-@pytest.mark.parametrize("ends", [(20.0, 22.0), (1e-3, 1e4)])
-def test_logarithmic_axes_have_a_few_numbers(ends: tuple[float, float]) -> None:
-    figure = Figure(layout="constrained")
-    axis = figure.subplots()
-    axis.plot(ends, ends)
-    axis.set(xscale="log", xlim=ends)
-    plain_ticks(axis.xaxis)
-    figure.draw_without_rendering()
-    labels = [*axis.get_xticklabels(), *axis.get_xticklabels(minor=True)]
-    shown = [t for t in labels if t.get_text() and ends[0] <= t.get_position()[0] <= ends[1]]
-    assert 2 <= len(shown) <= 9

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sa_solver.types import Grid
-from tests.workflow.command_line import invoke
+from tests.workflow.command_line import command
 from workflow.analyses.contact.case import ContactGrid
 from workflow.errors import UserError
 from workflow.shell.few_cells import check_cells
@@ -33,9 +33,8 @@ class Warnings(list):
 
 def run(tmp_path, text, *settings):
     (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
-    overrides = [part for entry in settings for part in ("--set", entry)]
     out = tmp_path / "out"
-    done = invoke("run", tmp_path / "case.yaml", "--out", out, "--force", *overrides)
+    done = command("run", tmp_path / "case.yaml", "--out", out, "--force", overrides=settings)
     if done.exit_code:
         return done, []
     return done, json.loads((out / "summary.json").read_text("utf-8"))["warnings"]
@@ -64,16 +63,6 @@ def test_a_point_is_refused(tmp_path):
     line = done.stderr.splitlines()[-1]
     assert "contact.grid: the contact is only 2 x 2 cells across" in line
     assert "finer cells are needed than those of contact.grid: [200, 200] or contact.size:" in line
-
-
-def test_a_contact_that_fills_its_grid_needs_more_cells_there():
-    settings = ContactGrid(grid=(64, 8), size=(2.0, 1.0))
-    pressure = np.zeros((64, 8))
-    pressure[20:40] = 1.0
-    reported = Warnings()
-    check_cells("flank", settings, Grid.covering((2.0, 1.0), (64, 8)), pressure, reported)
-    (line,) = reported
-    assert line.endswith("take contact.grid: [64, 14]")
 
 
 def test_one_that_has_worn_to_a_point_is_warned_of():

@@ -66,10 +66,6 @@ def test_a_peak_without_a_limit_is_found_by_its_cells() -> None:
     assert peak_lowered(in_plane) == pytest.approx(peak_lowered(means[:, None]), rel=1e-12)
 
 
-def test_nothing_pressed_has_no_peak() -> None:
-    assert peak_lowered(np.zeros((4, 3))) == 0.0
-
-
 # --- report ---------------------------------------------------------------------------------------
 
 ERROR = ResultError({"link": 0.004, "mesh": 0.03, "increments": None, "steps": 0.012})
@@ -103,10 +99,6 @@ def test_parts_of_opposite_sign_cancel_but_for_what_each_is_uncertain_by() -> No
         "estimated errors: volume 2.7 %",
         "largest parts for volume: mesh +4.0 %, increments -3.0 %",
     ]
-
-
-def test_one_sign_is_the_sum_of_sizes() -> None:
-    assert ResultError({"grid": 0.02, "steps": 0.03}).total == pytest.approx(0.05, rel=1e-12)
 
 
 def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> None:
@@ -307,11 +299,6 @@ def test_a_joint_in_space_is_judged_by_its_section() -> None:
     assert not cases.same
     assert cases.own.structure.dimension == neighbour(cases, "mesh").structure.dimension == 2
     assert cases.own.mesh == case.mesh
-
-
-def test_half_spaces_are_compared_with_linked_ones(section) -> None:
-    case = changed(section, {"contact.link": "half_space"})
-    assert neighbour(probe_cases_of(case), "link").contact.link == "corrected"
 
 
 def test_a_probe_run_that_fails_leaves_its_own_part_unknown(section, monkeypatch) -> None:
