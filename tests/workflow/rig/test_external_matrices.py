@@ -250,7 +250,7 @@ def test_a_joint_on_a_point_without_mass_is_in_series_with_its_spring(two):
     assert "warning: structure.massless: 2000 Hz is too low: at 310 Hz" in checked.stdout
 
 
-# --- told and refused ---------------------------------------------------------------------------
+# --- warnings and refusals ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -262,7 +262,7 @@ def test_a_joint_on_a_point_without_mass_is_in_series_with_its_spring(two):
         ("structure.matrices.file=gone.mat", "gone.mat"),
         ("structure.modes=3", "structure.modes"),
         ("structure.joints.0.points=tip", "structure.joints.0.points"),
-        ("structure.driven={load: 2}", "structure.driven.load"),
+        ("structure.driven={load: 2}", "structure.driven={load: 2}"),
     ],
 )
 def test_wrong_entries_are_named(two, override, named):
