@@ -128,7 +128,7 @@ def test_nastran_include(tmp_path):
     (tmp_path / "parts" / "upper.inc").write_text("CHEXA,2" + tail)
     deck = read(tmp_path, "deck.bdf", head + "include 'parts/upper.inc'\n")
     assert list(deck.bodies) == ["lower", "upper"]
-    with pytest.raises(MeshError, match=r"deck\.bdf:\d+: the included file gone\.inc is missing"):
+    with pytest.raises(MeshError, match=r"deck\.bdf:\d+: .*gone\.inc"):
         read(tmp_path, "deck.bdf", head + "INCLUDE gone.inc\n")
 
 

@@ -167,7 +167,7 @@ def test_gmsh_file_with_elements_in_no_group_is_refused(tmp_path):
     del mesh.field_data["upper"]
     path = tmp_path / "boxes.msh"
     _write_with_gmsh(path, mesh, 4.1, False, save_all=True)
-    with pytest.raises(MeshError, match="elements of volume 2 are in no physical group"):
+    with pytest.raises(MeshError, match="volume 2 are in no"):
         read_bodies(path)
 
 
@@ -385,7 +385,7 @@ def test_solid_and_plane_bodies_are_not_mixed(tmp_path):
     path = tmp_path / "surface.vtu"
     boxes = two_boxes()
     meshio.Mesh(boxes.points, [("triangle", boxes.cells[0].data[:, :3])]).write(path)
-    with pytest.raises(MeshError, match="surface elements only, and they are not in one plane"):
+    with pytest.raises(MeshError, match="not in one plane"):
         read_bodies(path)
 
 

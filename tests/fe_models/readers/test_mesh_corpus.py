@@ -113,7 +113,7 @@ def test_beams_on_edges_name_these_edges(tmp_path):
     path.write_text(FLAT + TETRA + trusses + "*SOLID SECTION, ELSET=edge\n1.\n", encoding="utf-8")
     assert read_bodies(path).unused == ("a.inp:9: stiffness of T3D2, which names edges",)
     path.write_text(FLAT + "5, 9., 9., 9.\n" + TETRA + EDGES.replace("1, 2", "1, 5"))
-    with pytest.raises(MeshError, match="B31 with nodes on no solid is a beam: mesh its volume"):
+    with pytest.raises(MeshError, match=r"B31 .* is a beam"):
         read_bodies(path)
 
 

@@ -159,7 +159,7 @@ def test_files_of_arrays(tmp_path, write, name):
     write(tmp_path / name)
     own = the_matrices(external_matrices({}, tmp_path / name, GivenUnknowns(ROWS)))
     np.testing.assert_array_equal(own.loads, LOAD)
-    with pytest.raises(MatrixError, match="does not say what its 3 rows are; allowed: unknowns"):
+    with pytest.raises(MatrixError, match=r"3 rows .* unknowns"):
         external_matrices({}, tmp_path / name)
 
 

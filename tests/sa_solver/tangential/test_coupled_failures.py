@@ -50,7 +50,7 @@ def test_impossible_data_are_refused(change):
 def test_a_line_contact_refuses_what_has_no_meaning_on_it():
     contact, height = cylinder(40, 0.4, 0.5)
     for name in ("Mx", "Mz"):
-        with pytest.raises(CoupledContactError, match=f"{name} or its motion has no meaning"):
+        with pytest.raises(CoupledContactError, match=name):
             contact.solve(height, None, loads(**{name: 1.0}))
 
 

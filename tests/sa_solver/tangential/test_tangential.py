@@ -395,7 +395,7 @@ def test_any_contact(seed):
 # -- refusals --
 def test_more_than_friction_can_carry():
     solver, limit, _ = sphere(32)
-    with pytest.raises(FrictionLimitError, match=r"Qx = 280\b.*impose the sliding motion") as info:
+    with pytest.raises(FrictionLimitError, match=r"Qx = 280\b") as info:
         solver.solve(limit, Qx=1.25 * SLIDING)
     assert info.value.share == pytest.approx(0.8, rel=1e-9)
 

@@ -150,5 +150,5 @@ def test_scans_without_information_are_refused(change, words):
         scar_problem([ScarData(**{**entries, **change})])
     with pytest.raises(FitError, match="twice"):
         runs(1.0, 1.0)
-    with pytest.raises(FitError, match="both bodies together and of one of them"):
+    with pytest.raises(FitError, match="both bodies together"):
         scar_problem([ScarData(**entries), ScarData(**entries, body="body_1")])

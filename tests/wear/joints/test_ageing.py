@@ -154,7 +154,7 @@ def test_a_test_may_end_at_an_energy(until) -> None:
 def test_an_energy_that_is_never_reached_is_reported() -> None:
     with pytest.raises(NeverReachedError, match="8 N mm are never reached"):
         long_test(lambda e: 1e-2 * max(7.0 - e, 0.0), until=8.0)
-    with pytest.raises(NeverReachedError, match="after 0 cycles and 0 N mm a cycle dissipates"):
+    with pytest.raises(NeverReachedError, match="0 cycles and 0 N mm"):
         long_test(lambda _: 0.0, until=8.0)
 
 

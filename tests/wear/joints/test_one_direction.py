@@ -244,7 +244,7 @@ def test_arrays_that_do_not_fit(law):
     with pytest.raises(JointError, match=r"must be \(2, 1\)"):
         law.respond(law.rest(2), np.zeros(2))
     of_three = replace(law, normal_load=np.ones(3))
-    with pytest.raises(JointError, match="parameters of 3 joints, the state is of 2"):
+    with pytest.raises(JointError, match=r"3 joints, .* 2"):
         of_three.respond(of_three.rest(2), np.zeros((2, 1)))
     with pytest.raises(JointError, match="a number or one per joint"):
         replace(law, normal_load=np.ones(3), friction=np.ones(2))

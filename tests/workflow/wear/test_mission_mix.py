@@ -144,7 +144,7 @@ def test_factors_of_a_mix_scale_the_loads_of_a_mesh(template_files):
     first, second = mesh_assembly(parse_case(template("mesh"), str(path), overrides)).load_cycles
     assert (first.share, second.share) == (0.6, 0.4)
     np.testing.assert_allclose(second.amplitudes, first.amplitudes * [0.5, 0.25], rtol=1e-14)
-    with pytest.raises(CaseError, match=r"load_path\.mix\.0\.factors: 2 factors for 1 loads"):
+    with pytest.raises(CaseError, match=r"load_path\.mix\.0\.factors: 2"):
         parse_case(template("mesh"), str(path), overrides[:1])
 
 
@@ -275,5 +275,5 @@ def test_interfaces_go_through_the_same_mix(tmp_path):
     text = "interface, P, block, share, Qx, Qy, Mx, My, Mz, Edx, Edy\n"
     text += "".join(f"{row}, 0, 0, 0, 0, 0, 0, 0\n" for row in rows)
     (tmp_path / "loads.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(InputFileError, match="blocks or shares of b and a differ"):
+    with pytest.raises(InputFileError, match="b and a differ"):
         read_resultants(tmp_path / "loads.csv")
