@@ -72,6 +72,14 @@ def test_richardson_finds_order_and_limit_of_a_power(steps: tuple[float, ...], o
     assert convergence.error == pytest.approx(3.0 - values[-1], rel=1e-9)
 
 
+def test_an_order_above_what_is_believed_is_not_used():
+    values = [1.0 + h**4 for h in (4.0, 2.0, 1.0)]
+    convergence = richardson(values, (4.0, 2.0, 1.0), order=2.0)
+    assert convergence.order == pytest.approx(4.0)
+    assert convergence.error == pytest.approx((values[1] - values[2]) / 3.0)
+    assert convergence.error > abs(values[-1] - 1.0)
+
+
 def test_values_that_swing_to_a_limit_have_it_between_the_last_two():
     convergence = richardson([1.4, 0.8, 1.1], (4.0, 2.0, 1.0), order=2.0)
     assert convergence.order is None
@@ -82,6 +90,17 @@ def test_values_that_do_not_settle_are_known_to_their_spread():
     convergence = richardson([1.0, 1.1, 0.7], (4.0, 2.0, 1.0), order=2.0)
     assert convergence.order is None
     assert convergence.error == pytest.approx(0.4)
+
+
+def test_rounding_is_no_convergence():
+    convergence = richardson([1.0, 1.0 + 2e-16, 1.0], (4.0, 2.0, 1.0), order=2.0, noise=1e-12)
+    assert convergence.order is None
+    assert convergence.error < 1e-12
+
+
+def test_few_rungs_say_little():
+    assert richardson([1.0, 1.2], (2.0, 1.0), order=2.0).error == pytest.approx(0.2)
+    assert richardson([1.0], (1.0,), order=2.0).error == np.inf
 
 
 # --- ladders ------------------------------------------------------------------------------------

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
 from fe_models.structure import CycleSolution, InterfaceHistory
-from sa_solver.types import Frame, resultants
+from sa_solver.types import Frame, Grid, resultants
 from tests.workflow.contact_loads import (
     COLUMNS,
     FRICTION,
@@ -121,6 +122,16 @@ def test_the_closure_of_a_cycle_is_written_and_read_back(tmp_path):
         assert file["f"].attrs["cycles"] == 13
     write_resultants_csv(table, {"f": history.loads})
     assert read_resultants(table)["f"].closure is None
+
+
+def test_slip_on_the_grid_is_the_same_bit_for_bit(tmp_path):
+    """The slip on the cells, from which wear is computed, is the same after reading."""
+    history, grid = face_history(), Grid.covering(SIZE, (32, 64))
+    write_resultants_h5(tmp_path / "loads.h5", {"f": history})
+    imported = read_resultants(tmp_path / "loads.h5")["f"]
+    before = FaceTransfer.between(history.interface, grid).to_cells(history.slip)
+    after = FaceTransfer.between(imported.face("f"), grid).to_cells(imported.slip)
+    assert before.tobytes() == after.tobytes()
 
 
 def test_results_of_a_run_are_read_from_their_group(tmp_path):

@@ -250,6 +250,21 @@ def test_a_joint_on_a_point_without_mass_is_in_series_with_its_spring(two):
     assert "warning: structure.massless: 2000 Hz is too low: at 310 Hz" in checked.stdout
 
 
+def test_a_mode_far_below_the_fastest_gives_a_warning(two):
+    np.savez(two / "two.npz", K=np.diag([1.0, 1e7, 2e7, 1e14]), M=1e-3 * np.eye(4))
+    (two / "unknowns.csv").write_text(f"{ROWS}a,x\nb,x\n", encoding="utf-8")
+    rig_of(two)
+    warning = "the mode of 5.03 Hz"
+    assert warning in (two / "run.log").read_text(encoding="utf-8")
+
+
+def test_added_masses_do_not_turn(two):
+    (two / "unknowns.csv").write_text("point,direction\nblock,x\nblock,rz\n", encoding="utf-8")
+    at = "structure.joints=[{points: block, direction: x}]", "structure.seen.points=block"
+    rig = rig_of(two, *at, "structure.masses=[{points: block, mass: 1 kg}]")
+    np.testing.assert_allclose(np.diag(rig.model.mass), [0.021, 0.001])
+
+
 # --- warnings and refusals ----------------------------------------------------------------------
 
 

@@ -125,6 +125,12 @@ def test_a_joint_ages_by_the_energy_of_its_loops(tmp_path):
     assert summary["ageing"]["stretch"]["difference"] == pytest.approx(0.0, abs=1e-6)
 
 
+def test_ageing_by_energy_ends_there(tmp_path):
+    summary = run(tmp_path, JOINT, "ageing={energy: 2 J}", "energies=[0 J, 1 J, 2 J]")
+    assert [state["energy"] for state in summary["states"]] == [0.0, 1e3, 2e3]
+    assert summary["cycles"] == pytest.approx(2e3 / LOOP_ENERGY, rel=1e-9)
+
+
 def test_a_joint_that_never_slides_cannot_be_aged_by_energy(tmp_path):
     code, message = refused(tmp_path, JOINT, "drive.stroke=1 um", "ageing={energy: 1 J}")
     assert code == 2

@@ -17,6 +17,7 @@ from tests.workflow.output.shown_files import check_arrays, check_scene
 from tests.workflow.vibration.vibration_pad import LOAD, ROWS, places, run_block
 from wear.joints.periodic.march import SEPARATED, SLIP
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
+from workflow.analyses.vibration.figures import loops as vibration_loops
 from workflow.analyses.vibration.figures import response as vibration
 from workflow.analyses.vibration.figures import states as vibration_states
 from workflow.analyses.vibration.output.outcome import VibrationContents
@@ -128,6 +129,14 @@ def test_loops_can_be_measured_again(folder: Path, summary: dict[str, Any], tmp_
     assert energy == pytest.approx(area, rel=1e-6)
     assert 0.8 * finest["energy"] < energy < finest["energy"]
     assert stiffness == pytest.approx(finest["stiffness"], rel=1e-6)
+
+
+def test_rising_branch_starts_where_the_motion_turns() -> None:
+    turns = 2.0 * np.pi * np.arange(101) / 100
+    moved, gained = vibration_loops.rising_branch(np.cos(turns), np.cos(turns - 0.4))
+    assert len(moved) == 51
+    np.testing.assert_allclose([moved[0], moved[-1]], [0.0, 2.0])
+    np.testing.assert_allclose(gained, np.cos(turns[50:] - 0.4) - np.cos(np.pi - 0.4), atol=1e-14)
 
 
 # --- figures ------------------------------------------------------------------------------------

@@ -194,6 +194,12 @@ def test_two_runs_are_bitwise_equal(start, whole, tmp_path):
     assert again.summary["kinetics"] == whole.summary["kinetics"]
 
 
+@pytest.mark.slow
+def test_last_jump_is_clipped_to_the_cycles_left(start, tmp_path):
+    run = start(tmp_path / "out", "wear.cycles=25000", *QUICK)
+    assert run.summary["kinetics"]["cycles"] == [0.0, 1e4, 2e4, 2.5e4]
+
+
 # --- steps and stops ----------------------------------------------------------------------------
 
 

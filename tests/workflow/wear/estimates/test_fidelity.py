@@ -79,6 +79,12 @@ def test_a_rung_near_the_last_by_chance_is_no_better_than_it():
         assert errors[0] >= errors[-1] > 0.05
 
 
+def test_a_flank_that_hardly_wears_is_measured_by_a_share_of_the_other():
+    values = [{"a": {"depth": 1.0}, "b": {"depth": v}} for v in (1e-3, 2e-3)]
+    errors = estimate(values, [2.0, 1.0], 1.0)["depth on the b"]
+    assert max(errors) == pytest.approx(2e-3 / 0.1, rel=1e-9)
+
+
 # --- increments -----------------------------------------------------------------------------------
 
 
