@@ -18,7 +18,9 @@ from workflow.kinds import load_case
 from workflow.runs import job as runs_job
 from workflow.runs.job import Job
 from workflow.runs.jobs import run_jobs
+from workflow.runs.provenance import provenance_of
 from workflow.runs.run import stored_run
+from workflow.shell.folders.folder import OutputFolder
 
 QUIET = "output: {paraview: false, figures: false}\n"
 # Jumps of some hundredths of a second each, so that a moment among them is easily met.
@@ -250,6 +252,29 @@ def test_whoever_is_killed_leaves_a_run_to_take_up(wear, tmp_path):
     taken_up, untouched = run_jobs(jobs, out)
     assert (out / "one/run.log").read_text("utf-8").count("resume: ") == 2
     assert without_times(taken_up.summary)["kinetics"] == untouched.summary["kinetics"]
+
+
+def test_a_damaged_state_is_started_again(wear, here, tmp_path):
+    job = Job("one", wear)
+    (done,) = run_jobs([job], tmp_path / "out")
+    folder = OutputFolder(done.folder)
+    folder.summary.unlink()
+    folder.checkpoint.write_bytes(folder.checkpoint.read_bytes()[:1000])
+    assert stored_run(done.folder, job.load()) == "nothing"
+    (again,) = run_jobs([job], tmp_path / "out")
+    assert without_times(again.summary) == without_times(done.summary)
+
+
+def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, here, tmp_path):
+    """The folder's case has the settings chosen by fidelity, and its record lists them."""
+    job = Job("one", wear)
+    (done,) = run_jobs([job], tmp_path / "out")
+    folder = OutputFolder(done.folder)
+    record = {"choice": {"chosen": {"contact.grid": [32, 8]}}}
+    folder.finish(done.summary | record, provenance_of(folder, job.load()))
+    asked = load_case(wear, ("contact.grid=[64, 16]",))
+    assert stored_run(done.folder, asked) == "finished"
+    assert stored_run(done.folder, load_case(wear, ("friction.coefficient=0.6",))) == "other"
 
 
 # --- a cluster ------------------------------------------------------------------------------------

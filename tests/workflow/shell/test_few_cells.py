@@ -65,6 +65,16 @@ def test_a_point_is_refused(tmp_path):
     assert "finer cells are needed than those of contact.grid: [200, 200] or contact.size:" in line
 
 
+def test_a_contact_that_fills_its_grid_needs_more_cells_there():
+    settings = ContactGrid(grid=(64, 8), size=(2.0, 1.0))
+    pressure = np.zeros((64, 8))
+    pressure[20:40] = 1.0
+    reported = Warnings()
+    check_cells("flank", settings, Grid.covering((2.0, 1.0), (64, 8)), pressure, reported)
+    (line,) = reported
+    assert line.endswith("take contact.grid: [64, 14]")
+
+
 def test_one_that_has_worn_to_a_point_is_warned_of():
     settings = ContactGrid(grid=(64, 64), size=(1.0, 1.0))
     grid, pressure, reported = Grid.covering((1.0, 1.0), (64, 64)), np.zeros((64, 64)), Warnings()

@@ -1,5 +1,6 @@
 """Tests of two dimensions: a section and the slot it represents, validity, and choice."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from workflow.case.text.readable import percent
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import load_case
+from workflow.shell.folders.folder import OutputFolder
 
 # Coarse enough to run in a second; probes have a mesh of their own.
 COARSE = "mesh.flank_nodes=[10, 10]", "mesh.size=8", "contact.grid=[64, 64]"
@@ -295,6 +297,18 @@ def test_a_slot_rounded_far_in_stays_in_space(plane_path):
     for flank in ("intrados", "extrados"):
         assert decision.probe["differences"][flank]["P"] > 0.2
         assert decision.probe["three"][flank]["P"] > decision.probe["two"][flank]["P"]
+
+
+@pytest.mark.usefixtures("dimension_only")
+def test_choice_is_kept_until_the_run_is_finished(plane_path, tmp_path):
+    """A run that is interrupted and resumed therefore still has the reasons."""
+    case, record = ANALYSIS.choose(auto(plane_path, "structure.skew=5 deg"))
+    folder = OutputFolder(tmp_path / "out")
+    folder.claim(case, force=False, resumable=True)
+    assert folder.choice is None
+    folder.keep_choice(record)
+    assert folder.choice == json.loads(json.dumps(record))
+    assert load_case(folder.case) == case
 
 
 @pytest.mark.slow
