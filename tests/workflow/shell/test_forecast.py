@@ -186,6 +186,19 @@ def test_jumps_on_given_slips_are_counted(cycles: float, tolerance: str, tmp_pat
     assert jumps / 3.0 < expected.jumps < 3.0 * jumps
 
 
+@pytest.mark.parametrize(
+    ("settings", "jumps"),
+    [
+        (["wear.step.cycles=500", "wear.cycles=1e5"], 200),
+        (["wear.step={kind: implicit, depth: 2 um}", "wear.stop.depth=0.1 mm"], 50),
+        (["wear.step={kind: implicit, volume: 1 mm^3}", "wear.stop.volume=8 mm^3"], 8),
+    ],
+)
+def test_jumps_of_a_given_size_are_counted(settings: list[str], jumps: int) -> None:
+    expected = steps_expected(load_case(CASES / "cylinder_wear.yaml", settings))
+    assert (expected.jumps, expected.unknown) == (jumps, "")
+
+
 def test_check_says_for_how_many_jumps_its_time_holds() -> None:
     """The time is given for a certain number of jumps, which is reported with it."""
     path, settings = CASES / "cylinder_wear.yaml", ["wear.step={kind: implicit, depth: 2 um}"]

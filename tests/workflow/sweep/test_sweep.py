@@ -138,6 +138,8 @@ def test_a_sample_is_the_same_again_and_another_with_another_seed(tmp_path):
         ("+{distribution: {kind: uniform, from: 0, to: 1}}", 3, "design: sample"),
         ("+{values: [0.5]}\nset: {friction.coefficient: 0.6}", 4, "friction.coefficient"),
         ("+{values: [0.5]}\ndesign: sample", 1, "samples"),
+        ("+{values: [0.5, 0.6]}\n  title: {values: [a, b, c]}\ndesign: zip", 5, "zip of 2, 3"),
+        ("+{values: [1, 2]}\n  title: {range: {from: 1, to: 2, count: 9000}}", 1, "18000"),
         # Found in the case, reported in the sweep.
         ("+{values: [0.5, -1]}", 3, "vary.friction.coefficient"),
         ("+{values: [0.5]}\nset: {contact.gird: 3}", 4, "grid"),
