@@ -67,7 +67,7 @@ def test_the_error_of_a_single_step_is_its_own():
 
 
 @pytest.mark.parametrize("room", [1.25, 1.4, 1.6])
-def test_ladders_of_grids_say_how_far_hertz_is(room):
+def test_ladders_of_grids_estimate_the_error_from_hertz(room):
     """The error of the central pressure is found within a factor of three for any position."""
     material = Material(115e3, 0.29)
     pair = ElasticPair(material, material)
@@ -89,7 +89,7 @@ def test_ladders_of_grids_say_how_far_hertz_is(room):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("curved", [False, True])
-def test_the_coupled_cycle_says_what_the_uncoupled_one_leaves(curved):
+def test_the_coupled_cycle_gives_the_error_of_the_uncoupled_one(curved):
     """The energy at 250 N is compared, with the increments of a run and six times as many."""
     face, stiffness = coarse_pads()
     pair = ReducedPair.from_stiffness(face, *stiffness)

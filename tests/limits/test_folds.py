@@ -45,7 +45,7 @@ def folded():
 
 
 @pytest.mark.slow
-def test_folds_are_passed_and_told(folded):
+def test_folds_are_passed_and_reported(folded):
     """Up and down find the same two folds, 103.0 and 108.2 Hz, three motions between them."""
     down = along_frequency(stopped(), 1.0, (60.0, 200.0), upward=False, control=SHORT)
     assert down.message == ""
@@ -125,7 +125,7 @@ def test_a_branch_that_starts_on_a_fold(folded):
     assert above.frequencies[-1] == start.frequency
 
 
-def test_a_start_beyond_a_fold_says_so_or_lands_on_the_other_side(folded):
+def test_a_start_beyond_a_fold_fails_or_lands_on_the_other_side(folded):
     """The largest motion does not exist above the fold; the small one is found there."""
     largest = max(folded.solutions, key=lambda solution: abs(solution.amplitude(2)))
     beyond = stopped().solve(112.0, 1.0, largest)

@@ -190,7 +190,7 @@ def test_a_joint_far_stiffer_than_a_step_resolves(stiffness):
 
 
 @pytest.mark.parametrize("step", [0.02, 1.0])
-def test_a_step_far_too_large_says_how_wrong_it_is(step):
+def test_the_error_of_a_step_far_too_large_is_estimated(step):
     """With 10 or 500 periods in a step the result is bounded (stable rule), but useless."""
     force = HarmonicForce(unit_force(RIG, "m1"), 75.0, 33.0)
     law = Jenkins(27.3e3, 0.5, 60.0)

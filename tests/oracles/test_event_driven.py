@@ -178,7 +178,7 @@ def test_nothing_moves_without_force():
 def test_what_is_no_slider_is_refused():
     with pytest.raises(ValueError, match="stiffness 0 N/mm"):
         sliders([0.0], [1.0], [0.0])
-    with pytest.raises(ValueError, match="2 joints for a connection of 1 rows"):
+    with pytest.raises(ValueError, match="2 joints"):
         integrate_exactly(
             mass_on_springs(1.0, 1.0), sliders([1.0] * 2, [1.0] * 2, [0.0] * 2), None, 1.0, 0.1
         )

@@ -87,7 +87,7 @@ def test_scans_turn_from_x_to_y_about_their_middle(angle):
 def test_what_turns_and_goes_on_mirrored_is_the_mirrored_scan():
     scan = Scan(RNG(2).normal(size=(20, 30)), (0.1, 0.1))
     grid = Grid.covering((4.0, 3.0), (40, 30))
-    with pytest.raises(InputError, match="2 mm x 3 mm, ends within the grid of 4 mm x 3 mm"):
+    with pytest.raises(InputError, match="2 mm x 3 mm, ends"):
         resampled(scan, grid)
     got = resampled(scan, grid, beyond="mirrored")
     np.testing.assert_allclose(got.heights, np.pad(scan.heights, ((10, 10), (0, 0)), "symmetric"))
@@ -138,13 +138,13 @@ def test_what_is_no_scan_is_refused():
     with pytest.raises(InputError, match="pitch above 0"):
         Scan(np.zeros((3, 3)), (1.0, 0.0))
     holes = Scan(np.where(np.eye(4) > 0, np.nan, 1.0), (1.0, 1.0))
-    with pytest.raises(InputError, match=r"25.0% of the points are missing: allow more than 5.0%"):
+    with pytest.raises(InputError, match=r"25.0% .* 5.0%"):
         filled(holes, 0.05)
     with pytest.raises(InputError, match="fill them first"):
         resampled(holes, Grid.covering((2.0, 2.0), (2, 2)))
-    with pytest.raises(InputError, match="3 points are too few to fit a plane: give at least 6"):
+    with pytest.raises(InputError, match=r"3 points .* at least 6"):
         levelled(Scan(np.array([[0.0, 1.0], [2.0, np.nan]]), (1.0, 1.0)), "plane")
-    with pytest.raises(InputError, match="a scan of 4 columns: give a profile"):
+    with pytest.raises(InputError, match="4 columns"):
         resampled(filled(holes), Grid.line_contact(2.0, 8))
 
 

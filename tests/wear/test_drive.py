@@ -162,7 +162,7 @@ def test_more_shear_than_friction_carries_is_reported() -> None:
     loads = loads_of(P=[40.0, 40.0], Qx=[21.0, -21.0])
     contact = interface(SPHERE, Drive.by_forces("held"), method="full")
     history = CycleLoads(loads, np.zeros((2, 2, 400)))
-    with pytest.raises(ContactFailure, match="increment 1: friction cannot carry Qx = 21 N"):
+    with pytest.raises(ContactFailure, match=r"increment 1: .* Qx = 21 N"):
         contact.begin(history, 1.0)
     weaker = replace(history, loads=loads_of(P=[40.0, 40.0], Qx=[19.0, -19.0]))
     assert contact.begin(weaker, 1.0)[1].energy.sum() > 0.0

@@ -115,12 +115,12 @@ def test_what_cannot_be_measured_is_refused():
     before, after, _, disk, _ = scans(5)
     with pytest.raises(InputError, match=r"no area is clearly deeper|more than two thirds"):
         measure_scar(after, before)  # in this order the body has grown
-    with pytest.raises(InputError, match="points are left around the worn area"):
+    with pytest.raises(InputError, match="around the worn area"):
         measure_scar(before, after, np.ones_like(disk))
     with pytest.raises(InputError, match=r"worn area has \(3, 3\) points"):
         measure_scar(before, after, np.ones((3, 3), dtype=bool))
     for pitch in (before.pitch[0] * 1e3, before.pitch[0] * 1e-3):
-        with pytest.raises(InputError, match="mm in common: give two scans of one body"):
+        with pytest.raises(InputError, match="mm in common"):
             measure_scar(before, Scan(after.heights, (pitch, pitch)))
     profile = Scan(np.zeros((9, 1)), (1.0, 1.0))
     with pytest.raises(InputError, match="a profile has no volume"):

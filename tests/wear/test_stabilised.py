@@ -61,7 +61,7 @@ def exact(cycles: float) -> Array:
 
 
 @pytest.mark.parametrize("stages", [2, 3, 5, 9, 30])
-def test_stages_are_stable_as_far_as_they_say_and_of_second_order(stages: int) -> None:
+def test_stages_are_stable_within_their_limit_and_of_second_order(stages: int) -> None:
     """On y' = z y, |R| <= 1, damped except for the longest waves, and R = 1 + z + z²/2 + O(z³)."""
     reach = 2.0 / 3.0 * (stages**2 - 1.0) * (1.0 - 2.0 * DAMPING / 15.0)
     assert stages_for(reach * (1.0 - 1e-9)) == stages

@@ -20,7 +20,6 @@ GRID = Grid.covering((4.0, 4.0), (24, 24))
 RADIUS, LOAD = 40.0, 2000.0
 BODY = Material(12e4 * (1 - 0.3**2), 0.3)
 PAIR = ElasticPair(BODY, BODY)
-MODULUS = PAIR.contact_modulus  # 6e4 MPa
 FRICTION, SLIP = 0.4, 0.02
 TOLERANCE = 1e-9
 BALL = (GRID.x**2 + GRID.y**2) / (2.0 * RADIUS)

@@ -20,7 +20,7 @@ from sa_solver.types import Array, Frame, Grid
 from tests.conftest import CASES
 from tests.wheels import sector, shoe
 from tests.workflow.case_leaves import BODY, CELLS, row_in_space
-from tests.workflow.command_line import invoke, runs_here
+from tests.workflow.command_line import command, invoke, runs_here
 from tests.workflow.mesh_scenes import pressed_blocks
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear import run as wear_run
@@ -435,9 +435,13 @@ def start(small_path: Path) -> Runner:
     quiet += "stress.section=none", "stress.life.parameter=none"
 
     def run(folder: Path, *overrides: str, force: bool = False) -> Run:
-        settings = [part for entry in (*fewer, *quiet, *overrides) for part in ("--set", entry)]
         forced = ["--force"] if force else []
-        return Run(invoke("run", small_path, "--out", folder, *forced, *settings), folder)
+        return Run(
+            command(
+                "run", small_path, "--out", folder, *forced, overrides=[*fewer, *quiet, *overrides]
+            ),
+            folder,
+        )
 
     return run
 

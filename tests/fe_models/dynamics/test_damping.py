@@ -126,7 +126,7 @@ def test_invalid_damping_is_refused():
         damped(model, dashpots={Link("c"): 1.0})
     with pytest.raises(RigError, match="3 damping ratios for 2 modes"):
         lumped_rig(MASSES, SPRINGS, [[Link("b")]], np.array([0.1, 0.1, 0.1]))
-    with pytest.raises(ValueError, match="structural damping is not known in time"):
+    with pytest.raises(ValueError, match="structural damping"):
         integrate(two_masses(loss_factor=0.1), None, None, 0.1, TimeStepControl(1e-3))
 
 

@@ -60,7 +60,7 @@ def test_derivatives_include_the_change_of_the_load_with_frequency():
 
 def test_phase_resonance_under_such_a_load_is_refused():
     balance = shaken(SLIDER)
-    with pytest.raises(HarmonicBalanceError, match="a load that changes with the frequency"):
+    with pytest.raises(HarmonicBalanceError, match="with the frequency"):
         along_phase_resonance(balance, balance.solve(100.0, 1.0), (0.5, 2.0))
 
 

@@ -12,7 +12,6 @@ from fe_models.dynamics.rig import (
     modal_damping,
     natural_frequencies,
     reduced_rig,
-    unit_force,
 )
 from fe_models.joints.reduction import reduce_body
 from tests.oracles.two_mass_rig import two_mass_rig
@@ -123,12 +122,6 @@ def test_joints_of_three_directions_are_rows_one_after_the_other():
     rig = lumped_rig(masses, {}, [joint, joint])
     assert rig.connection.shape == (6, 3)
     np.testing.assert_array_equal(rig.connection[:3], [[1, 0, 0], [0, 1, -1], [0, 0, 1]])
-
-
-def test_a_force_on_a_named_point():
-    np.testing.assert_array_equal(unit_force(PAPER_C, "m2"), [0.0, 1.0])
-    with pytest.raises(RigError, match="no point 'm3': the rig has m1, m2"):
-        unit_force(PAPER_C, "m3")
 
 
 def test_invalid_rigs_are_refused():

@@ -24,7 +24,7 @@ def test_all_combinations_that_leave_the_means(nodes):
     assert basis.nnz <= 3 * nodes * (GROUP + 6 * levels + 6)
 
 
-def test_means_that_say_the_same_count_once():
+def test_equal_means_count_once():
     points = np.random.default_rng(0).random((40, 3))
     means = np.random.default_rng(1).random((2, 40))
     means = np.append(means, means.sum(axis=0, keepdims=True), axis=0)
@@ -33,7 +33,7 @@ def test_means_that_say_the_same_count_once():
     np.testing.assert_allclose(means @ basis, 0.0, atol=1e-13)
 
 
-def test_constraints_beside_means():
+def test_constraints_next_to_means():
     """Check means with held and rigid nodes before, and sliding ones after.
 
     The means stay zero, and the free displacements are found again.

@@ -198,7 +198,7 @@ def test_tractions_are_taken_off_where_nothing_acts(dimension):
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_stress_without_bound_is_not_told_as_certain(order):
+def test_stress_without_bound_is_uncertain(order):
     """Check the error at a re-entrant corner, and at the end of a clamped face."""
     steps = np.linspace(0.0, 3.0, 13)
     whole = MeshTri.init_tensor(steps, steps)

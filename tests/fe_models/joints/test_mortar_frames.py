@@ -82,7 +82,7 @@ def test_bent_faces_report_their_angle(dimension):
 def test_faces_that_share_less_than_a_facet_are_refused(dimension):
     lower, upper = stacked(dimension, shift=0.0)
     aside = moved(upper, np.eye(3), np.array([1.15, 0.0, 0.0]))
-    with pytest.raises(MeshError, match="share less than a facet of z0: refine it"):
+    with pytest.raises(MeshError, match="less than a facet of z0"):
         mortar_interface("joint", lower, "z1", aside, "z0", Frame(np.zeros(3), np.eye(3)))
 
 
@@ -90,7 +90,7 @@ def test_faces_that_share_less_than_a_facet_are_refused(dimension):
 def test_faces_without_a_frame_are_refused(dimension):
     lower, upper = stacked(dimension)
     x, _, z = np.eye(3)
-    with pytest.raises(MeshError, match=r"x_direction .* is normal to face z1"):
+    with pytest.raises(MeshError, match=r"x_direction .* z1"):
         frame_of_faces(lower, "z1", upper, "z0", z)
     with pytest.raises(MeshError, match="do not face each other"):
         frame_of_faces(lower, "z1", upper, "z1", x)

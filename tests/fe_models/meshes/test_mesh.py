@@ -32,14 +32,6 @@ def test_triangle_that_is_no_face_is_refused():
         named_mesh(points, tets, {"wrong": np.array([[0, 1, 4]])})
 
 
-def test_faces_that_do_not_match_are_refused(dovetail, coarse_mesh):
-    finer = dovetail.mesh((8, 12), 8.0)
-    with pytest.raises(MeshError, match="80 and 96 nodes"):
-        matched_interface(
-            "intrados", coarse_mesh.bodies[0], finer.bodies[1], "intrados", dovetail.flank_frame(1)
-        )
-
-
 def test_shifted_face_is_refused(dovetail, coarse_mesh):
     shifted = replace(dovetail, neck_width=dovetail.neck_width + 1e-3).mesh((8, 10), 8.0)
     with pytest.raises(MeshError, match=r"0\.0005 mm apart"):

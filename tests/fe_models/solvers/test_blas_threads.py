@@ -22,9 +22,3 @@ def test_one_thread_within_and_as_many_as_before_after():
             np.linalg.inv(np.zeros((2, 2)))
         assert _numbers() == [1] * len(before)
     assert _numbers() == before
-
-
-def test_large_matrices_keep_all_threads():
-    before = _numbers()
-    with one_thread(SMALL + 1):
-        assert _numbers() == before

@@ -375,7 +375,7 @@ def test_curved_cuts_of_other_meshes():
     middles = part.points[part.mesh.facets.T].mean(axis=1)[:, [0, 2]]
     rng = np.random.default_rng(0)
     shaken = replace(part, midsides=middles + 0.01 * rng.standard_normal(middles.shape))
-    with pytest.raises(MeshError, match="midside nodes of its cuts are up to"):
+    with pytest.raises(MeshError, match="midside nodes of its cuts"):
         supported(shaken, 2, [Cuts.of(shaken, about(sectors=6))], lambda *_: None)
     other = sector(6, moved=0.3)
     middles = other.points[other.mesh.facets.T].mean(axis=1)[:, [0, 2]]
@@ -430,7 +430,7 @@ def test_cuts_of_which_a_part_is_named():
     low = part.mesh.boundaries["low"]
     body = Body("wheel", part.mesh.with_boundaries({"half": low[:2]}))
     cyclic = about(low=("half",))
-    with pytest.raises(MeshError, match="of one cut is not covered by the other; name all"):
+    with pytest.raises(MeshError, match="one cut is not covered"):
         supported(body, 1, [Cuts.of(body, cyclic)], lambda *_: None)
     every = about(low=("half", "low"))
     assert Cuts.of(body, every).matched

@@ -97,10 +97,10 @@ def test_a_load_inside_moves_what_is_retained(plate):
 
 
 def test_reductions_that_cannot_be_are_refused(plate):
-    with pytest.raises(MatrixError, match="modes of 880 displacements with mass that") as refusal:
+    with pytest.raises(MatrixError, match="880 displacements") as refusal:
         on_retained(plate, edge("left"), modes=5000)
     assert refusal.value.part == "modes"
-    with pytest.raises(MatrixError, match="can move while the points are held") as refusal:
+    with pytest.raises(MatrixError, match="can move") as refusal:
         on_retained(replace(plate, stiffness=0.0 * plate.stiffness), edge("left"), modes=2)
     assert refusal.value.part == "retained"
 
@@ -128,7 +128,7 @@ def test_motions_without_mass_are_given_a_frequency():
     mean = np.array([[0.5, 0.5, 0.0], [0.0, 0.0, 1.0]])
     mass = mean.T @ np.diag([2e-3, 5e-4]) @ mean
     bare = on_all(own_of(STIFFNESS, mass))
-    with pytest.raises(MatrixError, match="has no mass; allowed: masses added there, structure"):
+    with pytest.raises(MatrixError, match="no mass; allowed: masses"):
         check_definite(bare)
     model, light = with_light_motions(bare, 1e4)
     assert light == ("1 x",)

@@ -34,5 +34,5 @@ def test_nodes_on_a_line_carry_no_moment_about_it():
     none = np.zeros(3)
     forces = shared(BoundaryForce("edge", none, moment=np.array([0.0, 3.0, 0.0])), places)
     np.testing.assert_allclose(np.cross(places, forces).sum(axis=0), [0, 3, 0], atol=1e-12)
-    with pytest.raises(MeshError, match="the 3 nodes of edge cannot carry its moment"):
+    with pytest.raises(MeshError, match=r"nodes of edge .* moment"):
         shared(BoundaryForce("edge", none, moment=np.array([3.0, 0.0, 0.0])), places)

@@ -235,7 +235,7 @@ class TestStored:
             np.testing.assert_array_equal(getattr(read, name), values)
         assert list(tmp_path.iterdir()) == [path]
 
-    def test_every_dataset_says_what_it_is(self, model, tmp_path):
+    def test_every_dataset_is_described(self, model, tmp_path):
         save_reduced(tmp_path / "body.h5", model)
         with h5py.File(tmp_path / "body.h5") as file:
             assert set(file) == {name for name, value in vars(model).items() if value is not None}

@@ -216,7 +216,7 @@ def test_contact_face_that_meets_a_cut():
     part = sector(SECTORS, COUNTS)
     boundaries = part.mesh.boundaries | {"pad": part.mesh.boundaries["rim"]}
     part = replace(part, mesh=part.mesh.with_boundaries(boundaries))
-    with pytest.raises(MeshError, match="the face of contact pad 0 on body wheel meets a cut"):
+    with pytest.raises(MeshError, match="contact pad 0 on body wheel"):
         sector_of(part=part)
 
 
@@ -230,7 +230,7 @@ def test_temperatures_are_alike_on_both_cuts(moved):
         if alike:
             structure_of(part, [body], [load], [CYCLIC], 1)
         else:
-            with pytest.raises(MeshError, match="temperatures of body wheel differ between both"):
+            with pytest.raises(MeshError, match="temperatures of body wheel"):
                 structure_of(part, [body], [load], [CYCLIC], 1)
 
 

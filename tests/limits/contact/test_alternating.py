@@ -69,14 +69,6 @@ def test_it_converges_for_all_real_materials_up_to_a_friction_of_one(build):
     assert in_turns(build, 1.0, 0.5).converged
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("build", BODIES)
-def test_it_fails_beyond_and_says_so(build):
-    state = in_turns(build, 2.8, 0.5, share=0.95, rounds=30)
-    assert not state.converged
-    assert "solve both together" in state.message
-
-
 @pytest.mark.parametrize(("friction", "beta"), [(0.5, 0.5), (1.0, 0.5), (2.0, 0.25), (1.0, 0.25)])
 def test_its_factor_in_a_sliding_line_contact_is_the_product(friction, beta):
     measured = factor(in_turns(cylinder, friction, beta, share=0.95).changes)

@@ -5,11 +5,9 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
-from sa_solver.dissimilar.contact import CoupledContactError
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.normal.contact import NormalContact, NormalContactError
+from sa_solver.normal.contact import NormalContact
 from sa_solver.reference.hertz import HertzSphere
-from sa_solver.tangential.contact import TangentialContactError
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.limits.conditions import frictional_error
 
@@ -118,27 +116,3 @@ def test_a_gap_that_vanishes_to_rounding_is_no_crash():
         np.testing.assert_allclose(state.pressure, 1e-3, rtol=SOLVED)
     else:
         assert "rounding hides" in state.message
-
-
-@BOTH
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_numbers_that_are_none_are_refused(kind, bad):
-    grid = Grid.covering((1.0, 1.0), (12, 12))
-    contact, height = FrictionalContact(HalfSpace(grid, PAIRS[kind]), 0.5), ball(grid)
-    refused = NormalContactError, TangentialContactError, CoupledContactError
-    hole = height.copy()
-    hole[3, 4] = -bad  # +infinity is a cell without a surface
-    with pytest.raises(refused, match="NaN or -infinity"):
-        contact.advance(contact.unloaded_state(hole), hole, force(P))
-    pressed = contact.advance(contact.unloaded_state(height), height, force(P))
-    for place in range(6):
-        values = force(P).values
-        values[place] = bad
-        with pytest.raises(refused, match=r"finite|outside the cells|NaN or infinity"):
-            contact.advance(pressed, height, ContactLoad(values))
-    with pytest.raises(refused, match="NaN or infinity"):
-        contact.advance(pressed, height, ContactLoad(force(P).values, strain=bad))
-    with pytest.raises(refused, match=r"energies .* must be finite"):
-        contact.advance(pressed, height, ContactLoad(force(P).values, energy=np.array([bad, 0.0])))
-    with pytest.raises(ValueError, match="no area"):
-        Grid((4, 4), (bad, 1.0))

@@ -203,7 +203,7 @@ def test_loads_of_any_size(kind, P):
 
 
 @pytest.mark.parametrize("P", [slow(1e-7), 1e-5])
-def test_rounding_hides_tiny_loads_on_unlike_bodies_and_it_is_said(P):
+def test_rounding_hides_tiny_loads_on_dissimilar_bodies_with_a_message(P):
     """The splitting's state holds gaps over a cell's compliance: 2e4 MPa here, known to 4e-12.
 
     A pressure of 4e-4 MPa (1e-6 N) is then accurate to about 1e-8. Smaller loads are found only
@@ -250,7 +250,7 @@ def test_any_roughness_is_solved(rms, seed):
 
 @pytest.mark.parametrize("rms", [1e-3, 1e-1, 1.0])
 @pytest.mark.parametrize("seed", [0, slow(1)])
-def test_any_roughness_of_unlike_bodies_is_solved(rms, seed):
+def test_any_roughness_of_dissimilar_bodies_is_solved(rms, seed):
     """Three cells carry a load within the triangle of their centres; then sheared, and back."""
     grid, height = rough(24, rms, seed)
     contact = FrictionalContact(HalfSpace(grid, PAIRS["unlike"]), 0.5)

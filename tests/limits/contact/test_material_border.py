@@ -120,17 +120,3 @@ def test_bodies_that_are_almost_alike_are_solved_as_if_they_were():
     one, other = results
     np.testing.assert_allclose(other.traction, one.traction, atol=1e-6 * one.pressure.max())
     np.testing.assert_allclose(other.slip, one.slip, atol=1e-6 * np.abs(one.slip).max())
-
-
-@pytest.mark.parametrize(
-    ("young", "poisson"),
-    [(0.0, 0.3), (-1.0, 0.3), (np.nan, 0.3), (1e5, -0.1), (1e5, 0.51), (1e5, np.nan)],
-)
-def test_what_is_no_material_is_refused(young, poisson):
-    with pytest.raises(ValueError, match=r"(modulus|ratio).*: give a"):
-        ElasticPair(Material(young, poisson), Material(70e3, 0.3))
-
-
-def test_two_rigid_bodies_are_refused():
-    with pytest.raises(ValueError, match="two rigid bodies"):
-        ElasticPair(Material(np.inf, 0.3), Material(np.inf, 0.3))

@@ -100,7 +100,7 @@ def test_at_the_limit_rounding_does_not_choose_a_motion(off):
 
 
 @pytest.mark.slow
-def test_unlike_bodies_at_the_friction_of_the_load_solve_it_or_say_why():
+def test_dissimilar_bodies_at_the_friction_limit_converge_or_report_why_not():
     contact, height, pressed = pressed_on(sphere, "unlike", 16)
     given = load(Qx=(1.0 - 1e-9) * FRICTION * P)
     state = contact.advance(pressed, height, given)
@@ -201,7 +201,7 @@ def test_the_border_of_the_moment_is_sharp(distance):
     assert info.value.share == pytest.approx(1.0 / (1.0 + distance), rel=1e-6)
 
 
-def test_unlike_bodies_share_that_border():
+def test_dissimilar_bodies_share_that_border():
     """A pressure that depends on shear is known only once it has been found.
 
     The moment is then refused, but not within 0.1 % of the border.

@@ -18,12 +18,6 @@ def _fail() -> int:
     raise ZeroDivisionError
 
 
-def test_answers_are_in_the_order_of_the_jobs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(THREADS, "2")
-    jobs = [partial(_after, 0.02 * (3 - n), n) for n in range(4)]
-    assert run_parallel(jobs) == [0, 1, 2, 3]
-
-
 def test_jobs_work_side_by_side_only_where_threads_may(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(THREADS, "2")
     assert threads() == 2

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sa_solver.contact import FrictionalContact, FrictionError
+from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.tangential.contact import FrictionLimitError
@@ -129,7 +129,7 @@ def test_sliding_is_decided_by_force_and_energy():
         assert sliding.energy.sum() == pytest.approx(2.0, rel=1e-5)
         assert sliding.resultants[1] == pytest.approx(limit, rel=5e-3)
         assert not sliding.sticking.any()
-    with pytest.raises(FrictionLimitError, match="the largest in this direction is Qx = 180"):
+    with pytest.raises(FrictionLimitError, match="Qx = 180"):
         solver.advance(pressed, HEIGHT, load(300.0, 1.05 * limit))
 
 
@@ -153,12 +153,6 @@ def test_without_friction_there_is_no_shear():
     state = solver.advance(solver.unloaded_state(HEIGHT), HEIGHT, load(300.0))
     assert state.converged
     assert not state.shear.any()
-
-
-@pytest.mark.parametrize("friction", [-0.1, np.nan, np.inf])
-def test_friction_without_meaning(friction):
-    with pytest.raises(FrictionError, match="number of 0 or more"):
-        contact(friction)
 
 
 def test_strain_is_that_of_body_2_over_body_1():

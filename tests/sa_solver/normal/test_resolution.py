@@ -30,7 +30,7 @@ def test_cells_across_are_unbroken_rows():
 
 
 @pytest.mark.parametrize("share", [2.9, 4.0, 5.9, 8.1, 12.0, 15.8, 16.2])
-def test_the_peak_of_hertz_is_as_far_off_as_said(share):
+def test_the_peak_of_hertz_has_the_predicted_error(share):
     """There are ``share`` cells in the true diameter, on a grid of any position."""
     hertz = HertzSphere(100.0, 10.0, PAIR.contact_modulus)
     pitch = 2.0 * hertz.contact_radius / share

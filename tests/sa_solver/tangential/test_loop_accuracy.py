@@ -26,7 +26,7 @@ def marched(height, path, size, cells, pair=None):
 
 
 @pytest.mark.parametrize(("cells", "size"), [(16, 1.0), (24, 1.4), (32, 1.4)])
-def test_a_sphere_is_as_far_from_mindlin_as_said(cells, size):
+def test_the_estimated_error_of_a_sphere_is_that_from_mindlin(cells, size):
     """The estimate is a bound of at most 8 % for any number of cells across.
 
     With 24 cells the grid of half as many agrees to 1 % by chance, while the error is 2.5 %.

@@ -126,7 +126,7 @@ def test_a_step_in_single_precision_ends_exact():
     np.testing.assert_allclose(result.solution, expected.solution, rtol=0, atol=1e-9)
 
 
-def test_failure_is_said():
+def test_failure_is_reported():
     matrix, vector = linear_complementarity(8, 0)
     inverse = np.linalg.inv(matrix + np.eye(8))
     result = douglas_rachford(

@@ -111,7 +111,7 @@ def test_a_half_space_has_nothing_to_add() -> None:
         assert np.abs(stress).max() < 1e-7 * 300.0
 
 
-def test_few_nodes_tell_nothing() -> None:
+def test_few_nodes_determine_no_bulk_stress() -> None:
     grid = Grid.line_contact(1.0, 3)
     nothing = np.zeros((1, 3, 3))
     face = BodyFace(grid, CellNodes(grid), METAL, 2)

@@ -170,13 +170,13 @@ def test_a_tilt_that_is_held_is_that_of_the_structure() -> None:
     np.testing.assert_allclose(held, imposed, atol=5e-3 * imposed.max())
 
 
-def test_faces_that_say_nothing_are_half_spaces() -> None:
+def test_open_faces_are_linked_as_half_spaces() -> None:
     face = line_face(21)
     loads = replace(on_layer(face, 2.0), force=None)
     assert not first(contact(face), loads).link.corrects
 
 
-def test_one_node_says_nothing() -> None:
+def test_one_node_determines_no_link() -> None:
     """A contact narrower than the mesh is that of half-spaces."""
     face = line_face(5)
     assert not first(contact(face), on_layer(face, 0.5)).link.corrects

@@ -146,7 +146,7 @@ def test_order_of_convergence(stepper, order) -> None:
 
 
 @pytest.mark.parametrize("life", [0.5, 3.0, 10.0])
-def test_heuns_steps_keep_to_tolerance_and_limit_and_say_what_they_leave(life) -> None:
+def test_heuns_steps_keep_to_tolerance_and_limit_and_estimate_their_error(life) -> None:
     cycles, counts = life * float(SCALES.max()), []
     limit = springs(unworn()).stable_cycles(unworn())
     for tolerance in (0.3, 0.1, 0.03):

@@ -205,7 +205,7 @@ def test_a_sliding_cylinder_wears_as_in_a_model_of_its_own(stepper, jumps: int) 
 
 
 @pytest.mark.parametrize("kind", [ImplicitStepper, SecondOrderStepper])
-def test_steps_of_moving_surfaces_say_what_they_leave(kind) -> None:
+def test_the_error_of_steps_of_moving_surfaces_is_estimated(kind) -> None:
     """The estimated error of either depth is within a factor of three, and near the tolerance."""
     grid, load, each_way, cells, cycles = Grid.line_contact(0.72, 72), 18.5, 2, 6, 1e4
     stroke, form = each_way * cells * 0.01, (grid.x**2 / (2.0 * RADIUS)).ravel()

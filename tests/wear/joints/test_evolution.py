@@ -48,7 +48,7 @@ def test_forms_are_factors_that_start_at_one(form) -> None:
     assert np.all(np.isfinite(form(np.array([5e-324, 1e-300, 1e12]))))
 
 
-def test_forms_say_what_the_papers_write() -> None:
+def test_forms_are_those_of_the_papers() -> None:
     energy = np.array([0.3, 40.0, 9e5])
     log = 1.0 + 0.26 * np.log(1.3e6 * energy + 1.0)
     np.testing.assert_allclose(FORMS[0](energy), log, rtol=1e-14)
@@ -117,11 +117,6 @@ def test_every_joint_has_an_energy_of_its_own() -> None:
 def test_what_is_worn_to_nothing_stays_so() -> None:
     law = JointEvolution(normal_load=LinearEvolution(-1e-3)).at(Law(), 5e3)
     assert law.normal_load == 0.0
-
-
-def test_a_law_without_the_parameter_is_refused() -> None:
-    with pytest.raises(ValueError, match="Law has no residual_stiffness that could evolve"):
-        JointEvolution(residual_stiffness=LinearEvolution(1.0)).at(Law(), 1.0)
 
 
 def test_kinks_are_those_of_the_tables() -> None:

@@ -202,5 +202,5 @@ def test_balance_of_harmonics_is_the_motion_in_time():
 
 
 def test_numbers_of_joints_must_fit():
-    with pytest.raises(JointError, match="5 joints are given for groups of 4"):
+    with pytest.raises(JointError, match=r"5 joints .* 4"):
         ALL.rest(5)

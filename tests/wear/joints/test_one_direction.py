@@ -210,32 +210,32 @@ def test_an_increment_of_nothing_changes_nothing(law):
 
 @EVERY
 @pytest.mark.parametrize(
-    ("changes", "sentence"),
+    "changes",
     [
-        ({"stiffness": 0.0}, "stiffness of a joint is 0.0: it must be finite and above 0"),
-        ({"stiffness": np.nan}, "stiffness of a joint is nan"),
-        ({"friction": -0.1}, "friction of a joint is -0.1: it must be finite and 0 or more"),
-        ({"normal_load": np.array([1.0, -1.0])}, "normal_load of a joint"),
-        ({"residual_stiffness": np.inf}, "residual_stiffness of a joint is inf"),
+        {"stiffness": 0.0},
+        {"stiffness": np.nan},
+        {"friction": -0.1},
+        {"normal_load": np.array([1.0, -1.0])},
+        {"residual_stiffness": np.inf},
     ],
 )
-def test_impossible_parameters(law, changes, sentence):
-    with pytest.raises(JointError, match=sentence):
+def test_impossible_parameters_are_named(law, changes):
+    with pytest.raises(JointError, match=next(iter(changes))):
         replace(law, **changes)
 
 
 @pytest.mark.parametrize(
-    ("law", "changes", "sentence"),
+    ("law", "changes"),
     [
-        ("bouc-wen", {"residual_stiffness": 40e3}, "must be below its stiffness"),
-        ("bouc-wen", {"sigma": 0.4}, "must be from 0.5"),
-        ("bouc-wen", {"exponent": 0.5}, "1 or more"),
-        ("four parameters", {"chi": -1.0}, "above -1"),
-        ("four parameters", {"beta": -1.0}, "0 or more"),
+        ("bouc-wen", {"residual_stiffness": 40e3}),
+        ("bouc-wen", {"sigma": 0.4}),
+        ("bouc-wen", {"exponent": 0.5}),
+        ("four parameters", {"chi": -1.0}),
+        ("four parameters", {"beta": -1.0}),
     ],
 )
-def test_impossible_shapes(law, changes, sentence):
-    with pytest.raises(JointError, match=sentence):
+def test_impossible_shapes_are_refused(law, changes):
+    with pytest.raises(JointError):
         replace(LAWS[law], **changes)
 
 
@@ -244,7 +244,7 @@ def test_arrays_that_do_not_fit(law):
     with pytest.raises(JointError, match=r"must be \(2, 1\)"):
         law.respond(law.rest(2), np.zeros(2))
     of_three = replace(law, normal_load=np.ones(3))
-    with pytest.raises(JointError, match="parameters of 3 joints, the state is of 2"):
+    with pytest.raises(JointError, match=r"3 joints, .* 2"):
         of_three.respond(of_three.rest(2), np.zeros((2, 1)))
     with pytest.raises(JointError, match="a number or one per joint"):
         replace(law, normal_load=np.ones(3), friction=np.ones(2))

@@ -1,4 +1,4 @@
-"""Mutants of the shipped cases and of the templates: texts, and overrides of the command line.
+"""Mutants of the shipped cases and of the templates.
 
 A mutant is determined by its number: the same number makes the same mutant again.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 import copy
 import json
 import random
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -48,28 +47,6 @@ VALUES: tuple[Any, ...] = (
     *([1e300, 1e300], [1e-300, 1e-300], [4096, 4096], [8, 8], list(range(200)), ["1 N"] * 150),
     *(list(range(3000)), {f"k{n}": n for n in range(300)}, [{"a": n} for n in range(200)]),
 )  # fmt: skip
-ODD_KEYS = (
-    "",
-    " ",
-    "a.b",
-    "=5",
-    "=null",
-    "=[1]",
-    "=1.5",
-    "=true",
-    "=? x",
-    "ü",
-    "kind",
-    "law",
-    "x" * 3000,
-)
-BYTES = (
-    *(b"\t", b"\x00", b"\xff", b"\xef\xbb\xbf", b"\r", b"\x85", b"\xe2\x80\xa8", b"{", b"]"),
-    *(b":", b"- ", b"#", b"'", b'"', b"&a ", b"*a", b"|", b"%YAML 9.9\n", b"---\n", b"...\n"),
-    *(b"<<: ", b"!!", b"\x1b[2J", b"? ", b",", b"\n", b"  "),
-)  # fmt: skip
-
-OFF = re.compile(rb"^( *)# ?( *(?:- )?\w+:)")
 
 
 @dataclass(frozen=True)
@@ -78,7 +55,6 @@ class Mutant:
 
     number: int
     text: bytes
-    overrides: tuple[str, ...]
     reported: str
 
 
@@ -99,30 +75,11 @@ class Mutants:
     def __getitem__(self, number: int) -> Mutant:
         chance = random.Random(number)
         name = chance.choice(list(self._texts))
-        way = chance.choices((self._in_the_tree, self._in_the_text, self._overridden), (7, 2, 2))[0]
-        text, overrides, reported = way(chance, name)
-        return Mutant(number, text, overrides, f"{name}: {reported}")
-
-    # --- ways ------------------------------------------------------------------------------------
-
-    def _in_the_tree(self, chance: random.Random, name: str) -> tuple[bytes, tuple[str, ...], str]:
         tree, reported = copy.deepcopy(self._trees[name]), []
         for _ in range(chance.choice((1, 1, 1, 2, 3))):
             reported.append(self._change(chance, tree))
-        return written(tree).encode("utf-8", "surrogatepass"), (), ", ".join(reported)
-
-    def _in_the_text(self, chance: random.Random, name: str) -> tuple[bytes, tuple[str, ...], str]:
-        raw, reported = self._texts[name].encode(), []
-        for _ in range(chance.choice((1, 1, 2, 5))):
-            raw, how = _edited(chance, raw)
-            reported.append(how)
-        return raw, (), ", ".join(reported)
-
-    def _overridden(self, chance: random.Random, name: str) -> tuple[bytes, tuple[str, ...], str]:
-        tree = self._trees[name]
-        overrides = tuple(_override(chance, tree) for _ in range(chance.choice((1, 1, 2, 4))))
-        shown = " ".join(f"--set {override[:200]!r}" for override in overrides)
-        return self._texts[name].encode(), overrides, shown
+        text = written(tree).encode("utf-8", "surrogatepass")
+        return Mutant(number, text, f"{name}: {', '.join(reported)}")
 
     def _change(self, chance: random.Random, tree: Any) -> str:
         """Change a tree of plain data; return a short description."""
@@ -149,7 +106,9 @@ class Mutants:
         elif how == "rename" and isinstance(holder, dict):
             holder[_misspelt(chance, str(key))] = holder.pop(key)
         elif how == "add" and isinstance(holder, dict):
-            holder[chance.choice(ODD_KEYS)] = copy.deepcopy(chance.choice(VALUES))
+            holder[chance.choice(("", "a.b", "=5", "=[1]", "ü", "x" * 3000))] = copy.deepcopy(
+                chance.choice(VALUES)
+            )
         elif how == "scale":
             holder[key] = _scaled(chance, holder[key])
         elif how == "wrap":
@@ -199,45 +158,6 @@ def _scaled(chance: random.Random, value: Any) -> Any:
         )
     except ValueError:
         return value[::-1]
-
-
-def _edited(chance: random.Random, raw: bytes) -> tuple[bytes, str]:
-    """Return the text with a change that ignores YAML syntax."""
-    place = chance.randrange(len(raw) + 1)
-    lines = raw.split(b"\n")
-    line = chance.randrange(len(lines))
-    how = chance.choice(("cut", "insert", "drop", "twice", "indent", "flip", "join", "take"))
-    if how == "cut":
-        return raw[:place], f"cut at {place}"
-    if how == "insert":
-        added = chance.choice(BYTES)
-        return raw[:place] + added + raw[place:], f"{added!r} at {place}"
-    if how == "flip":
-        other = bytes([chance.randrange(256)])
-        return raw[:place] + other + raw[place + 1 :], f"{other!r} for one at {place}"
-    if how == "take":  # an entry that a template has as a comment, with those below it
-        rows = [number for number, row in enumerate(lines) if OFF.match(row)]
-        line = chance.choice(rows or [line])
-        for number in range(line, min(line + chance.choice((1, 1, 2, 5)), len(lines))):
-            lines[number] = OFF.sub(rb"\1\2", lines[number])
-    elif how == "drop":
-        del lines[line]
-    elif how == "twice":
-        lines.insert(line, lines[line])
-    elif how == "indent":
-        lines[line] = chance.choice((b" ", b"  ", b"\t", b"- ")) + lines[line]
-    else:
-        lines[line : line + 2] = [b"".join(lines[line : line + 2])]
-    return b"\n".join(lines), f"{how} line {line + 1}"
-
-
-def _override(chance: random.Random, tree: Any) -> str:
-    path = ".".join(map(str, chance.choice(list(places(tree)))))
-    key = chance.choice((path, path, path, path, path + ".a", path + ".0", path + ".999999999999",
-                         "x" * 100_000, "a." * 1000 + "a", "", ".", path[1:], f"{path}.", "0", "-1",
-                         "9" * 5000, "٣", "structure.²", "a b", "a=b", "\n", "\x00"))  # fmt: skip
-    value = chance.choice(VALUES)
-    return f"{key}{chance.choice(('=',) * 9 + ('',))}{_scalar(value)}"
 
 
 # --- as YAML --------------------------------------------------------------------------------------

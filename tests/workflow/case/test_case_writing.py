@@ -1,7 +1,6 @@
 """Written cases are read back unchanged; the template is the default case."""
 
 import json
-import re
 
 import pytest
 from ruamel.yaml import YAML
@@ -32,15 +31,6 @@ def test_dump_reads_back_equal(dovetail_path, overrides):
     text = dump_case(case)
     assert parse_case(text, "dump") == case
     assert dump_case(parse_case(text, "dump")) == text
-
-
-def test_dump_keeps_the_units_of_what_is_expected(dovetail_path):
-    """Expected values may have any dimension, so the file of the run states their units."""
-    expect = "[{quantity: a, value: 2.50 kN, tolerance: 0, kind: earlier, source: a}]"
-    case = load_case(dovetail_path, [f"expect={expect}"])
-    (again,) = parse_case(dump_case(case), "dump").expect
-    assert (again.value, again.value.unit) == (2500.0, "kN")
-    assert "value: 2.50 kN" in dump_case(case)
 
 
 def test_dump_has_every_default(dovetail_path, dovetail_text):
@@ -93,12 +83,3 @@ def test_template_has_every_entry(kind):
                 yield from names(section)
 
     assert set(names(kinds()[kind])) <= set(lines)
-
-
-def uncommented(text, *sections):
-    """Return ``text`` with the optional ``sections`` filled in, each with the lines below it."""
-    for section in sections:
-        block = re.search(rf"^( *)# {section}:.*\n(?:\1#   .*\n)*", text, re.MULTILINE)
-        opened = re.sub(rf"^{block[1]}# ", block[1], block[0], flags=re.MULTILINE)
-        text = text[: block.start()] + opened + text[block.end() :]
-    return text

@@ -34,7 +34,9 @@ def without(tree: Any, place: tuple[str | int, ...]) -> str:
 
 
 @pytest.mark.parametrize("kind", [kind if kind in QUICK else slow(kind) for kind in kinds()])
-def test_whatever_is_left_out_is_asked_for_or_told(kind: str, folders: dict[str, Path]) -> None:
+def test_entries_left_out_are_missing_or_have_a_shown_default(
+    kind: str, folders: dict[str, Path]
+) -> None:
     name = str(folders[kind] / "case.yaml")
     tree = YAML(typ="safe", pure=True).load(template(kind))
     whole, unnamed = parse_case(written(tree), name), list[str]()
@@ -61,10 +63,3 @@ def test_a_case_with_every_default_written_out_takes_none(dovetail_path: Path) -
     assert "mesh.size" not in text
     assert "loops" not in text  # there are none
     assert taken(parse_case(dump_case(case), "case.yaml")) == []
-
-
-def test_of_items_alike_the_default_is_told_once(folders: dict[str, Path]) -> None:
-    legs = "load_path.legs=[{P: 400 N}, {Qx: 100 N}]"
-    case = parse_case(template("bodies"), str(folders["bodies"] / "case.yaml"), [legs])
-    ((_, text),) = taken(case)
-    assert text.count("load_path.legs.*.increments 1") == 1

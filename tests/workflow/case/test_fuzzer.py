@@ -5,8 +5,6 @@ The numbers of the mutants are their seeds: ``Mutants(sources())[number]`` makes
 
 from __future__ import annotations
 
-import json
-import math
 import re
 import shutil
 import signal
@@ -20,7 +18,6 @@ import pytest
 
 from tests.conftest import CASES
 from tests.marks import slow
-from tests.workflow import scenes
 from tests.workflow.case.mutants import Mutant, Mutants, sources
 from tests.workflow.command_line import command
 from workflow.case.text.writing import dump_case
@@ -32,8 +29,6 @@ ENDLESS = 60.0
 BLOCK, QUICK, ALL = 50, 4, 50
 # What a line may be long, of any text that somebody may write.
 LONGEST = 600
-# Of runs: those looked at, and seconds after which one has shown enough.
-RUNS, ENOUGH = 25, 10
 
 posix_only = pytest.mark.skipif(sys.platform == "win32", reason="has no alarm")
 
@@ -55,7 +50,7 @@ def mutants() -> Mutants:
 def checked(mutant: Mutant, path: Path) -> Any:
     """Return how ``check`` ends; any exception except an exit is raised."""
     path.write_bytes(mutant.text)
-    return command("check", path, overrides=mutant.overrides)
+    return command("check", path)
 
 
 def faults(mutant: Mutant, path: Path) -> Iterator[str]:
@@ -88,14 +83,16 @@ def _of_an_accepted_one(mutant: Mutant, path: Path, printed: str) -> Iterator[st
     outline = printed.partition("\n")[2]
     if re.search(r"\b(nan|inf|None)\b", outline):
         yield f"no numbers: {outline}"
-    case = load_case(path, mutant.overrides)
+    case = load_case(path)
     if parse_case(dump_case(case), str(path)) != case:
         yield "another case once it is written"
 
 
 @posix_only
 @pytest.mark.parametrize("block", [block if block < QUICK else slow(block) for block in range(ALL)])
-def test_whatever_is_wrong_is_told_in_its_place(block: int, folder: Path, mutants: Mutants) -> None:
+def test_wrong_cases_are_refused_with_their_place(
+    block: int, folder: Path, mutants: Mutants
+) -> None:
     for number in range(block * BLOCK, (block + 1) * BLOCK):
         mutant = mutants[number]
         try:
@@ -127,41 +124,3 @@ def alarm(seconds: float) -> Iterator[None]:
 
 
 # --- runs -----------------------------------------------------------------------------------------
-
-QUIET = "output: {paraview: false, figures: false}\n"
-
-
-def _numbers(summary: Any) -> Iterator[float]:
-    values = summary.values() if isinstance(summary, dict) else summary
-    for value in values if isinstance(summary, dict | list) else ():
-        if isinstance(value, float):
-            yield value
-        yield from _numbers(value)
-
-
-@posix_only
-@pytest.mark.slow
-def test_what_is_accepted_runs_or_says_why_not(tmp_path: Path) -> None:
-    """Small accepted cases end with one of our exit codes, one line, and no NaN."""
-    small = Mutants({"ball": scenes.BALL + QUIET, "roller": scenes.ROLLER_WEAR})
-    (tmp_path / "loads.csv").write_text(scenes.ROLLER_LOADS, encoding="utf-8")
-    path, looked_at = tmp_path / "mutant.yaml", 0
-    for number in range(100 * RUNS):
-        mutant, out = small[number], tmp_path / f"out{number}"
-        if looked_at == RUNS:
-            return
-        if mutant.overrides or checked(mutant, path).exit_code:
-            continue
-        reported, looked_at = f"mutant {number}: {mutant.reported}", looked_at + 1
-        try:
-            with alarm(ENOUGH):
-                ended = command("run", path, "--out", out)
-        except TooLong:
-            continue
-        except Exception as error:
-            raise AssertionError(reported) from error
-        assert ended.exit_code in (0, 2, 3, 4), (reported, ended.stderr)
-        assert "Traceback" not in ended.stderr, (reported, ended.stderr)
-        if ended.exit_code == 0:
-            summary = json.loads((out / "summary.json").read_bytes())
-            assert all(map(math.isfinite, _numbers(summary))), reported

@@ -43,14 +43,6 @@ def plain(text):
     return YAML(typ="safe", pure=True).load(text)
 
 
-def test_it_is_of_its_dialect(schema):
-    jsonschema.Draft202012Validator.check_schema(schema)
-    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
-    assert "$id" not in schema
-    titles = [schema["$defs"][one["$ref"].rpartition("/")[2]]["title"] for one in schema["oneOf"]]
-    assert titles == [*kinds(), "sweep", *FITS]
-
-
 def test_every_entry_is_described(schema):
     bare = [
         f"{name}.{key}"
@@ -63,7 +55,7 @@ def test_every_entry_is_described(schema):
 
 
 @pytest.mark.parametrize("kind", kinds())
-def test_fixed_words_tell_the_kinds_apart(schema, kind):
+def test_fixed_words_distinguish_the_kinds(schema, kind):
     """An editor then proposes only the entries of the kind."""
     (case,) = [d for d in schema["$defs"].values() if d.get("title") == kind]
     assert case["description"] == about()[kind]
@@ -95,38 +87,16 @@ def test_templates_are_valid(validator, kind):
         ("dovetail", "grid: [128, 256]", "grid: [128, 256, 1]"),
         ("dovetail", "    young: 115 GPa", "    # young: 115 GPa"),
         ("bodies", "shape: sphere", "shape: cylinder"),
-        ("bodies", "  radius: 10 mm", "  # radius: 10 mm"),
-        ("line", "size: 2 mm", "size: [2 mm, 2 mm]"),
-        ("rig", "kind: harmonic", "kind: hammer"),
         ("vibration", "forces: [10 N, 40 N]", "forces: 10 N"),
-        ("dovetail", "end_radius: 150 mm", "# end_radius: 150 mm"),
         ("dovetail", "slot_length: 60 mm", "slot_length: -60 mm"),
-        ("bodies", "  legs:", "  # legs:"),
-        ("joint", "  cycles: 1080000.0", "  # cycles: 1080000.0"),
-        ("specimens", "  cycles: 300000.0", "  # cycles: 300000.0"),
         ("sweep", "values: [0.3, 0.4, 0.5]", "value: 0.3"),
         ("fit_wear", "law: energy ", "law: archard "),
     ],
 )
-def test_wrong_files_are_not(validator, kind, old, new):
+def test_wrong_files_are_invalid(validator, kind, old, new):
     text = text_of(kind)
     assert old in text
     assert not validator.is_valid(plain(text.replace(old, new, 1)))
-
-
-@pytest.mark.parametrize("none", ["contacts", "supports", "loads"])
-def test_what_must_be_there_is_not_empty(validator, none):
-    case = plain(template("mesh"))
-    case["structure"][none] = []
-    assert not validator.is_valid(case)
-
-
-def test_what_stands_for_nothing_is_valid(validator):
-    """An empty entry is one that is not given, as for the loader."""
-    case = plain(template("dovetail"))
-    case["structure"] |= {"dimension": 2, "end_width": None}
-    del case["structure"]["end_radius"]
-    assert validator.is_valid(case)
 
 
 # Mutants whose data the schema is asked about, too: those that keep the case apart from their text.
@@ -140,8 +110,6 @@ def test_whatever_the_loader_takes_is_valid(validator, block, folders):
     name = str(folders["resultants"] / "mutant.yaml")
     for number in range(block * MUTANTS, (block + 1) * MUTANTS):
         mutant = mutants[number]
-        if mutant.overrides:
-            continue
         try:
             text = mutant.text.decode()
             parse_case(text, name)
@@ -158,12 +126,8 @@ def test_whatever_the_loader_takes_is_valid(validator, block, folders):
     [
         ("Ti-6Al-4V", True),
         ({"material": "100Cr6", "young": "210 GPa"}, True),
-        ({"young": 1e5, "poisson": 0.3}, True),
-        ("rigid", True),
         ("steel", False),
         ({"young": 1e5}, False),
-        ({"material": "steel"}, False),
-        ({"young": 1e5, "poisson": 0.3, "density": 1e-9}, False),
     ],
 )
 def test_a_body_has_a_name_or_numbers(validator, body, valid):

@@ -3,9 +3,8 @@
 import pytest
 
 from tests.conftest import CASES
-from workflow.case.materials import MATERIALS, near
+from workflow.case.materials import MATERIALS
 from workflow.case.text.writing import dump_case
-from workflow.commands.materials import known_materials
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case
 
@@ -44,12 +43,6 @@ def test_a_name_stands_for_its_numbers(dovetail_path):
     assert named.materials.blade.model_dump() == {"material": "Ti-6Al-4V"} | TITANIUM
 
 
-def test_what_is_given_beside_a_name_stands(dovetail_path):
-    overrides = ["materials.blade={material: Ti-6Al-4V, yield_stress: 830 MPa}"]
-    blade = load_case(dovetail_path, overrides).materials.blade
-    assert blade.model_dump() == {"material": "Ti-6Al-4V"} | TITANIUM | {"yield_stress": 830.0}
-
-
 def test_an_override_goes_into_a_name(dovetail_path):
     """An override changes an entry of a named material, as in a sweep."""
     overrides = ["materials.blade=Ti-6Al-4V", "materials.blade.young=110 GPa"]
@@ -57,7 +50,7 @@ def test_an_override_goes_into_a_name(dovetail_path):
     assert (blade.material, blade.young, blade.poisson) == ("Ti-6Al-4V", 110e3, 0.342)
 
 
-def test_the_case_of_a_run_says_name_and_numbers(dovetail_path):
+def test_the_case_of_a_run_has_name_and_numbers(dovetail_path):
     case = load_case(dovetail_path, ["materials.blade=Ti-6Al-4V", "materials.disk=100Cr6"])
     text = dump_case(case)
     assert "material: Ti-6Al-4V" in text
@@ -65,49 +58,21 @@ def test_the_case_of_a_run_says_name_and_numbers(dovetail_path):
     assert parse_case(text, "dump") == case
 
 
-def test_a_contact_takes_what_it_needs():
-    case = load_case(CASES / "sphere_normal.yaml", ["materials.body_1=316L"])
-    assert case.materials.body_1.model_dump() == {
-        "material": "316L",
-        "young": 200e3,
-        "poisson": 0.3,
-        "yield_stress": 170.0,
-    }
-
-
 @pytest.mark.parametrize(
     ("written", "meant"),
-    [
-        *(("Ti6Al4V", "Ti-6Al-4V"), ("ti-6al-4v", "Ti-6Al-4V"), ("Ti64", "Ti-6Al-4V")),
-        *(("IN718", "Inconel 718"), ("AISI 52100", "100Cr6"), ("52100", "100Cr6")),
-        *(("AISI 316L", "316L"), ("7075", "7075-T6"), ("C45", "AISI 1045"), ("1.7225", "42CrMo4")),
-    ],
+    [("ti-6al-4v", "Ti-6Al-4V"), ("IN718", "Inconel 718"), ("52100", "100Cr6")],
 )
 def test_other_names_lead_to_the_known_one(dovetail_path, written, meant):
-    assert near(written) == meant
-    for body in (written, f"{{material: {written}}}"):
-        line = refused(dovetail_path, f"materials.blade={body}")
-        assert f"unknown material, did you mean '{meant}'?; allowed: " in line
+    assert f"'{meant}'" in refused(dovetail_path, f"materials.blade={written}")
 
 
-@pytest.mark.parametrize("wrong", ["rust", "5", "''", "[a]", "true"])
-def test_anything_else_is_refused_in_one_line(dovetail_path, wrong):
-    line = refused(dovetail_path, f"materials.blade={wrong}")
-    assert "did you mean" not in line
-    assert "; allowed: " in line
+@pytest.mark.parametrize("wrong", ["rust", "5", "[a]"])
+def test_other_materials_are_refused(dovetail_path, wrong):
+    assert "materials.blade" in refused(dovetail_path, f"materials.blade={wrong}")
 
 
-def test_density_is_for_what_has_inertia(dovetail_path):
-    reported = "nothing here depends on mass; allowed: leave it out"
-    for case in ("sphere_normal", "sphere_wear", "cylinder_wear", "line_bulk_stress"):
-        line = refused(CASES / f"{case}.yaml", "materials.body_1.density=4430 kg/m^3")
-        assert line.endswith(reported), line
+def test_density_is_for_bodies_with_inertia(dovetail_path):
+    path, density = CASES / "sphere_normal.yaml", "materials.body_1.density=4430 kg/m^3"
+    assert "materials.body_1.density" in refused(path, density)
     line = refused(dovetail_path, "materials.blade={young: 1 GPa, poisson: 0.3}")
-    assert "materials.blade.density: missing; allowed: mass per volume" in line
-
-
-def test_the_list_has_them_all():
-    text = "\n".join(known_materials())
-    for name, known in MATERIALS.items():
-        assert f"\n{name} " in text
-        assert known.source in text
+    assert "materials.blade.density" in line

@@ -23,7 +23,7 @@ from tests.workflow.case_leaves import (
 from tests.workflow.sweep.test_bands import told_by_fit
 from workflow.case.sections import KINDS_ARE_NAMED_BY, sections_of
 from workflow.errors import CaseError
-from workflow.kinds import about, kinds, parse_case, template
+from workflow.kinds import kinds, parse_case, template
 from workflow.sweep.schema import load_sweep
 from workflow.sweep.template import sweep_template
 
@@ -190,20 +190,6 @@ def test_template_shows_every_kind_of_section(kind):
                 shown(section)
 
     shown(kinds()[kind])
-
-
-def test_kinds_are_told_in_plain_words():
-    words = about()
-    assert list(words) == list(kinds())
-    assert len(set(words.values())) == len(words)
-    assert all(20 < len(text) < 80 for text in words.values())
-
-
-def test_templates_tell_editors_of_the_schema():
-    for text in (*map(template, kinds()), sweep_template()):
-        first, second, *_ = text.splitlines()
-        assert first == "# yaml-language-server: $schema=fretscale.schema.json"
-        assert "`fretscale schema > fretscale.schema.json`" in second
 
 
 def test_every_comment_of_a_sweep_may_be_opened(tmp_path, dovetail_text):

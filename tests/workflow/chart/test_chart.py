@@ -1,6 +1,5 @@
 """Tests of charts without runs: frontier, Richardson, ladders, costs with a cache, axes."""
 
-import json
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -14,15 +13,13 @@ from workflow.analyses.wear.approximations.approximation import Approximation, R
 from workflow.analyses.wear.approximations.convergence import richardson
 from workflow.analyses.wear.output.measures import profile_difference
 from workflow.case.text.writing import dump_case
-from workflow.chart import Chart, accuracy_of
+from workflow.chart import Chart
 from workflow.chart.axes import AXES, axes_of
-from workflow.chart.costs import RunCost, costs, stage_seconds
+from workflow.chart.costs import RunCost, costs
 from workflow.chart.frontier import Option, cheapest, efficient
-from workflow.chart.ladder import Ladder, Point, judge
-from workflow.chart.report import sentences, write_chart
+from workflow.chart.ladder import Point, judge
 from workflow.errors import UserError
 from workflow.kinds import load_case
-from workflow.shell.output.summary import number_at
 
 # --- frontier -----------------------------------------------------------------------------------
 
@@ -40,10 +37,6 @@ def test_efficient_points_are_those_that_nothing_beats_in_both():
         best = min(c for c, e in points if e <= accuracy)
         kept = [c for (c, e), flag in zip(points, flags, strict=True) if flag and e <= accuracy]
         assert min(kept) == best
-
-
-def test_of_points_alike_one_is_efficient():
-    assert efficient([1.0, 1.0, 2.0], [0.1, 0.1, 0.1]) == [True, False, False]
 
 
 def test_cheapest_combination_is_that_of_an_exhaustive_search():
@@ -188,52 +181,10 @@ def test_the_bound_holds_against_the_true_limit():
         assert rung.bound == pytest.approx(true, rel=0.15)
 
 
-def test_quantities_that_are_zero_or_missing_are_left_out():
-    points = [
-        point("a", 2.0, {"depth": 1.1, "nothing": 0.0, "here": 1.0}, 1.0),
-        point("b", 1.0, {"depth": 1.0, "nothing": 0.0}, 2.0),
-    ]
-    assert list(judge(GRID, points, {}, {}).references) == ["depth"]
-
-
-def test_the_last_rung_of_a_choice_is_right_by_definition():
-    points = [point("own", None, {"depth": 1.1}, 1.0), point("full", None, {"depth": 1.0}, 9.0)]
-    ladder = judge(METHOD, points, {}, {})
-    assert ladder.floor == 0.0
-    assert [rung.bound for rung in ladder.rungs] == pytest.approx([0.1, 0.0])
-    assert not any(rung.unresolved for rung in ladder.rungs)
-
-
 def charted(accuracy: float) -> Chart:
     points = [point("own", None, {"depth": 1.001}, 2.0), point("full", None, {"depth": 1.0}, 9.0)]
     method = judge(METHOD, points, {}, {"broken": "no convergence"})
     return Chart("Test", (judge(GRID, second_order(), {"volume": 2.0}, {}), method), accuracy)
-
-
-@pytest.mark.slow
-def test_files_of_a_chart(tmp_path: Path):
-    written = write_chart(charted(0.1), tmp_path)
-    assert written["figure"] == tmp_path / "figures/chart_all.png"
-    lines = (tmp_path / "chart.csv").read_text("utf-8").splitlines()
-    assert len(lines) == 6
-    assert lines[0].startswith("axis,branch,rung,settings,own,folder,depth,volume,error")
-    summary = json.loads((tmp_path / "summary.json").read_text("utf-8"))
-    assert summary["together"]["rungs"] == {"grid": "fine", "method": "own"}
-    assert summary["axes"]["method"]["failed"] == {"broken": "no convergence"}
-    assert summary["axes"]["grid"]["references"]["volume"]["exact"] is True
-    drawn = {path.name for path in (tmp_path / "figures").iterdir()}
-    assert drawn == {"chart_grid.png", "chart_method.png", "chart_all.png"}
-
-
-def test_figures_of_odd_ladders(tmp_path: Path):
-    """Ladders with only a reference, without convolutions or with an unknown floor are drawn."""
-    alone = judge(GRID, [point("own", 1.0, {"depth": 1.0}, 0.01)], {}, {})
-    empty = Ladder(METHOD, (), {}, {"own": "failed"})
-    chart = Chart("Odd", (alone, empty), 0.01)
-    write_chart(chart, tmp_path)
-    assert (tmp_path / "figures" / "chart_grid.png").exists()
-    assert sentences(chart)[1] == "method: nothing ran"
-    assert json.loads((tmp_path / "summary.json").read_text("utf-8"))["together"] is None
 
 
 # --- measures -----------------------------------------------------------------------------------
@@ -249,13 +200,6 @@ LOG = """\
 10:00:16 wear: 1.25 s
 10:00:17 paraview and figures: 7.00 s
 """
-
-
-def test_seconds_of_the_log_by_stage():
-    seconds = stage_seconds(LOG.format(condensation="8.00", unworn="3.00"))
-    assert seconds["wear"] == [1.0, 1.25]
-    assert seconds["structural friction"] == [3.0, 2.5]
-    assert not any(name.startswith("run") for name in seconds)
 
 
 def test_what_is_found_in_the_cache_costs_what_it_took_to_compute(tmp_path: Path, small_path: Path):
@@ -276,13 +220,6 @@ def test_what_is_found_in_the_cache_costs_what_it_took_to_compute(tmp_path: Path
     assert third.seconds == pytest.approx(whole + 3.0)
 
 
-def test_numbers_are_found_by_their_path():
-    summary = {"states": [{"P": 1.0}, {"P": 2}], "flag": True, "text": "x"}
-    assert number_at(summary, "states.-1.P") == 2.0
-    for path in ("states.5.P", "states.P", "flag", "text", "text.0", "states"):
-        assert number_at(summary, path) is None
-
-
 @pytest.mark.parametrize("line", [False, True])
 def test_depth_anywhere_is_compared_across_grids(line: bool):
     """A smooth field on two grids differs by the interpolation; a bump by its height."""
@@ -296,12 +233,6 @@ def test_depth_anywhere_is_compared_across_grids(line: bool):
 
     assert profile_difference(depths(32, 0.0), depths(128, 0.0)) == pytest.approx(0.0, abs=1e-3)
     assert profile_difference(depths(32, 0.1), depths(128, 0.0)) == pytest.approx(0.1, abs=2e-3)
-
-
-def test_depths_in_the_plane_are_not_compared_with_those_in_space():
-    plane = Grid((8, 1), (0.1, 1.0), True), np.ones((8, 1)), np.ones((8, 1))
-    space = Grid((8, 8), (0.1, 0.1)), np.ones((8, 8)), np.ones((8, 8))
-    assert profile_difference({"face": plane}, {"face": space}) is None
 
 
 # --- axes ---------------------------------------------------------------------------------------
@@ -365,27 +296,6 @@ def test_axes_that_apply(case: str, expected: set[str]):
 
 def test_axes_that_do_not_apply_are_refused():
     path = next(path for path in CASES if path.stem == "sphere_fretting")
-    with pytest.raises(UserError, match="--axis mesh: does not apply to this case; allowed: grid,"):
-        axes_of(path, (), ("grid", "mesh"))
-    with pytest.raises(UserError, match="--axis gird: no such axis; allowed: grid, tolerance"):
-        axes_of(path, (), ("gird",))
-    (axis,) = axes_of(path, (), ("grid",))
-    assert axis.name == "grid"
-
-
-def test_a_skewed_slot_has_no_section():
-    path = next(path for path in CASES if path.stem == "dovetail")
-    names = {axis.name for axis in axes_of(path, ("structure.skew=10 deg",), ())}
-    assert "dimension" not in names
-    assert "mesh" in names
-
-
-@pytest.mark.parametrize(("text", "value"), [("1 %", 0.01), ("0.02", 0.02), ("1", 1.0)])
-def test_accuracy_is_a_share(text: str, value: float):
-    assert accuracy_of(text) == pytest.approx(value)
-
-
-@pytest.mark.parametrize("text", ["0", "-1 %", "200 %", "much", "1 mm"])
-def test_accuracy_that_is_none_is_refused(text: str):
-    with pytest.raises(UserError, match=r"--accuracy .*allowed"):
-        accuracy_of(text)
+    for name in ("mesh", "gird"):
+        with pytest.raises(UserError, match=f"--axis {name}"):
+            axes_of(path, (), ("grid", name))

@@ -2,10 +2,6 @@
 
 import csv
 import json
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -45,7 +41,6 @@ expect:
     source: Hertz
     exact: true
 """
-PATIENCE = 120.0  # seconds that a chart of the sphere may take on a busy machine
 
 RunJobs = Callable[..., list[Finished]]
 
@@ -125,27 +120,6 @@ def test_grids_of_a_sphere_go_to_hertz_at_second_order(ball, tmp_path, monkeypat
     rows = list(csv.DictReader((tmp_path / "out" / "chart.csv").open(encoding="utf-8")))
     assert [row["rung"] for row in rows] == names
     assert float(rows[-1]["error"]) == pytest.approx(errors[-1])
-
-
-def test_refusals_come_before_any_run(ball: Path, tmp_path: Path):
-    out = tmp_path / "out"
-    wrong = {
-        ("--axis", "stepper"): "stepper: does not apply to this case; allowed: grid, tolerance",
-        ("--accuracy", "nothing"): "--accuracy 'nothing'",
-        ("--set", "contact.gird=3"): "gird",
-    }
-    for options, message in wrong.items():
-        result = chart(ball, out, *options)
-        assert result.exit_code == 2
-        assert message in result.stderr
-    assert not out.exists()
-
-
-def test_a_folder_of_something_else_is_left_alone(ball: Path, tmp_path: Path):
-    result = chart(ball, ball.parent)
-    assert result.exit_code == 2
-    assert "not empty and no chart of fretscale" in result.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["sphere.yaml"]
 
 
 # --- made-up runs -------------------------------------------------------------------------------
@@ -275,13 +249,6 @@ def test_dimensions_are_compared_in_the_middle(small_path, tmp_path, monkeypatch
     assert "depth anywhere" not in two.extras
 
 
-@pytest.mark.slow
-def test_explicit_steps_that_take_too_long_are_left_out(small_path, tmp_path, monkeypatch):
-    runs, ladders = made_up(monkeypatch, small_path, tmp_path, axes=("stepper",), limit=5.0)
-    assert list(ladders["stepper"].failed) == ["explicit, 0.9 of its limit"]
-    assert not any("explicit" in job.name for job in runs.ran)
-
-
 def test_quantities_can_be_picked(small_path, tmp_path, monkeypatch):
     settings = {"axes": ("grid",), "quantities": ("intrados.volume_1",)}
     _, ladders = made_up(monkeypatch, small_path, tmp_path / "a", **settings)
@@ -316,29 +283,3 @@ def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert errors["second order, 10 jumps"] < 0.1 * errors["implicit, 10 jumps"]
     assert [rung.name for rung in ladder.rungs if rung.baseline] == ["implicit, 10 jumps"]
     assert all(rung.cost.solves > 0 for rung in ladder.rungs)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
-def test_a_chart_that_was_killed_goes_on(ball: Path, tmp_path: Path):
-    out = tmp_path / "out"
-    command = [sys.executable, "-c", "from workflow.cli import main; main()"]
-    command += ["chart", str(ball), "--out", str(out), "--axis", "grid"]
-    running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    first, second = (out / "runs" / name for name in ("own", "grid-16-x-16"))
-    try:
-        deadline = time.monotonic() + PATIENCE
-        while not (second / ".fretscale.lock").exists():
-            assert running.poll() is None
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
-    finally:
-        running.send_signal(signal.SIGKILL)
-        running.wait()
-    assert not (out / "summary.json").exists()
-    kept = (first / "summary.json").stat().st_mtime_ns
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
-    assert "grid: for 1 % take" in done.stdout
-    assert (first / "summary.json").stat().st_mtime_ns == kept
-    summary = json.loads((out / "summary.json").read_text("utf-8"))
-    assert len(summary["axes"]["grid"]["rungs"]) == 4

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -106,25 +105,12 @@ def test_a_finished_run_stays_and_another_case_takes_its_place(contact, here, tm
     assert changed.summary["states"][-1]["P"] == pytest.approx(500.0, rel=1e-6)
 
 
-def test_case_in_the_words_of_another_version_is_the_same(contact, here, tmp_path):
-    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
-    case = done.folder / "case.yaml"
-    case.write_text(case.read_text("utf-8").replace("#", "# formerly:"), encoding="utf-8")
-    assert stored_run(done.folder, load_case(contact)) == "finished"
-
-
 def test_what_is_no_run_is_left_alone(contact, here, tmp_path):
     figures = tmp_path / "out/mine/figures"
     figures.mkdir(parents=True)
     (done,) = run_jobs([Job("mine", contact)], tmp_path / "out")
     assert "not empty and no run of fretscale" in done.error
     assert figures.exists()
-
-
-@pytest.mark.parametrize("names", [["a", "a"], ["a/b"], [".."], [""]])
-def test_names_are_folders_of_their_own(contact, tmp_path, names):
-    with pytest.raises(ValueError, match="name"):
-        run_jobs([Job(name, contact) for name in names], tmp_path / "out")
 
 
 @pytest.mark.parametrize(
@@ -142,15 +128,6 @@ def test_a_process_that_ends_early_is_a_failure(contact, tmp_path, monkeypatch, 
     assert reported in done.error
 
 
-@pytest.mark.slow
-def test_a_mistake_of_the_program_leaves_its_traceback_in_the_log(contact, tmp_path, monkeypatch):
-    code = "import workflow.analyses.contact.run as c; c.bodies_of = None;" + interpreter.COMMAND
-    monkeypatch.setattr(interpreter, "COMMAND", code)
-    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
-    assert done.error == "TypeError: 'NoneType' object is not callable"
-    assert "Traceback" in (done.folder / "run.log").read_text("utf-8")
-
-
 def test_jobs_have_one_thread_each(contact, tmp_path, monkeypatch):
     names = list(interpreter.THREAD_SETTINGS)
     for name in names:
@@ -159,12 +136,6 @@ def test_jobs_have_one_thread_each(contact, tmp_path, monkeypatch):
     monkeypatch.setattr(interpreter, "COMMAND", code)
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     assert done.error.endswith(f"SystemError: {['1'] * len(names)}")
-
-
-def test_a_run_takes_a_core_for_each_of_its_contacts(dovetail_path, contact, wear):
-    assert load_case(dovetail_path).cores == 2
-    assert load_case(contact).cores == 1
-    assert load_case(wear).cores == 1
 
 
 def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
@@ -318,28 +289,8 @@ def test_no_scheduler_is_one_line(contact, tmp_path, monkeypatch):
     from workflow.runs import cluster as runs_dask
 
     monkeypatch.setattr(runs_dask, "PATIENCE", "1 s")
-    with pytest.raises(UserError, match=r"--dask tcp://127.0.0.1:9: no scheduler answers: \S+"):
+    with pytest.raises(UserError, match=r"--dask tcp://127.0.0.1:9: "):
         run_jobs([Job("one", contact)], tmp_path / "out", dask="tcp://127.0.0.1:9")
-
-
-@pytest.mark.slow
-@posix_only
-def test_a_scheduler_that_is_killed_is_one_line(contact, tmp_path, caplog):
-    pytest.importorskip("distributed")
-    file = tmp_path / "scheduler.json"
-    module = "distributed.cli.dask_scheduler"
-    options = "--port=0", "--no-dashboard", f"--scheduler-file={file}"
-    scheduler = subprocess.Popen([sys.executable, "-m", module, *options], stderr=subprocess.PIPE)
-    try:
-        address = json.loads(wait_until(lambda: file.exists() and file.read_text()))["address"]
-        threading.Timer(1.0, scheduler.kill).start()
-        # No worker is there to take the run before.
-        with pytest.raises(MethodFailed, match=r"the scheduler has gone, 1 of 1 runs"):
-            run_jobs([Job("one", contact)], tmp_path / "out", dask=address)
-    finally:
-        scheduler.kill()
-        scheduler.communicate()
-    assert not caplog.records
 
 
 @pytest.fixture
@@ -352,24 +303,8 @@ def impatient(monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_first_worker_may_come_late(contact, tmp_path, impatient, caplog):
-    """The wait for it is longer than that for lost workers, since a queue may be long."""
-    distributed = pytest.importorskip("distributed")
-    options = {"n_workers": 0, "processes": False, "dashboard_address": None}
-    with distributed.LocalCluster(**options) as cluster:
-        threading.Timer(5.0, cluster.scale, (1,)).start()
-        address = cluster.scheduler_address
-        (done,) = run_jobs([Job("one", contact)], tmp_path / "out", dask=address)
-    assert not done.error
-    (reported,) = (
-        record.getMessage() for record in caplog.records if record.name[:8] == "workflow"
-    )
-    assert reported.startswith(f"--dask {address}: no worker yet, 1 of 1 runs wait for one")
-
-
-@pytest.mark.slow
 @posix_only
-def test_workers_that_have_all_gone_are_told_and_given_up(wear, tmp_path, impatient, caplog):
+def test_a_run_fails_if_all_workers_have_gone(wear, tmp_path, impatient, caplog):
     """Their stored states remain, so that runs can be resumed."""
     distributed = pytest.importorskip("distributed")
     out = tmp_path / "out"

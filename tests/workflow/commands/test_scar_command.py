@@ -63,50 +63,17 @@ def test_two_scans_give_volume_table_map_and_figure(pair, tmp_path):
     assert (again.exit_code, again.stderr.count("\n")) == (2, 1)
 
 
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        (["--worn", "0,1,2"], "not four; allowed: lengths from the middle"),
-        (["--worn", "0 N,1,2,3"], "allowed: a length such as '4 um'"),
-        (["--worn", "5,6,5,6"], "no point of the scan is in it"),
-        (["--bare", "um", "4 um", "4 um"], "states its units and pitch itself"),
-        (["--bare", "ell", "4 um", "4 um"], "no such unit; allowed: m, mm, um, nm"),
-    ],
-)
-def test_wrong_words_are_told_in_one_line(pair, more, words):
+@pytest.mark.parametrize("more", [["--worn", "0,1,2"], ["--worn", "0 N,1,2,3"]])
+def test_wrong_options_are_refused_in_one_line(pair, more):
     ended = command("scar", *pair[:2], *more)
     assert ended.exit_code == 2
     (line,) = ended.stderr.splitlines()
-    assert words in line
+    assert "--worn" in line
 
 
-def test_files_mixed_up_are_told(pair):
-    """In the reverse order the body has grown, although no clear area shows it."""
-    ended = command("scar", pair[1], pair[0])
-    assert ended.exit_code == 2
-    assert "no area is clearly deeper than the noise" in ended.stderr
-    given = command("scar", pair[1], pair[0], "--worn", "-0.33,0.33,-0.33,0.33")
-    assert "warning: the volume does not differ from none" in given.stdout
-
-
-def test_a_scan_and_itself_have_no_error_that_is_told(pair, tmp_path):
-    done = command("scar", pair[0], pair[0], "--worn", "-0.3,0.3,-0.3,0.3", "--out", tmp_path)
-    assert (done.exit_code, done.stderr) == (0, "")
-    assert done.stdout.splitlines()[0] == "volume   0 um^3 (0 mm^3), error unknown"
-    assert "warning: both scans agree around the worn area" in done.stdout
-    assert (tmp_path / "scar.csv").read_text("utf-8").splitlines()[1] == "volume [mm^3],0,"
-    assert "nan" not in done.stdout + (tmp_path / "scar.csv").read_text("utf-8")
-
-
-# Place, and what is there in a damaged file of 96 x 96 points, in the header and in the heights.
 DAMAGE = {
     "points far apart.sur": (120, np.float32(1e4).tobytes()),
-    "points close together.sur": (120, np.float32(1e-9).tobytes()),
-    "heights of kilometres.sur": (128, np.float32(1e3).tobytes()),
-    "heights of kilometres.sdf": (48, np.float64(1e9).tobytes()),
     "one huge height.sdf": (20_000, np.float64(1e250).tobytes()),
-    "zeros up to the end.sdf": (200, bytes(96 * 96 * 8)),
-    "cut off.sdf": (-9, b""),
     "cut off.x3p": (-9, b""),
 }
 

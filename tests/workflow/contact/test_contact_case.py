@@ -1,7 +1,5 @@
 """Tests of contact cases: refusals in one line each, and the path and files that are read."""
 
-import re
-
 import h5py
 import numpy as np
 import pytest
@@ -9,11 +7,10 @@ import pytest
 from sa_solver.types import Material
 from tests.workflow.scenes import BALL
 from workflow.analyses.contact.case import ContactCase, LineContactCase
-from workflow.case.files.input_files import InputFileError, read_heights
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import parse_case
-from workflow.models.uncoupled.load_table import FORCES, LoadTable
+from workflow.models.uncoupled.load_table import LoadTable
 
 ROLLER = (
     BALL.replace("shape: sphere", "shape: cylinder")
@@ -23,43 +20,29 @@ ROLLER = (
 )
 RIGID_2 = "  body_2: {young: 115 GPa, poisson: 0.29}", "  body_2: rigid"
 
-# Name, base, text to replace, its replacement, key in the message, words in it.
+SPHERE = "shape: sphere, radius: 10 mm"
+NO_FRICTION = "friction: {coefficient: 0.7}\n", ""
+# Base, text to replace, its replacement, key in the message.
 WRONG = [
-    ("no structure", BALL, "structure: {kind: bodies, shape: sphere, radius: 10 mm}\n", "",
-     "structure.kind", "missing; allowed: bodies"),
-    ("no shape", BALL, "shape: sphere, ", "", "structure.shape", "missing; allowed: sphere, "),
-    ("entry of another shape", BALL, "sphere", "ellipsoid", "structure.radius",
-     "did you mean 'radius_"),
-    ("unknown body", BALL, *RIGID_2[:1], "  body_2: steel", "materials.body_2",
-     "'steel': unknown material; allowed: a name that `fretscale materials` lists"),
-    ("rigid, misspelt", BALL, *RIGID_2[:1], "  body_2: rigidly", "materials.body_2", "'rigid'"),
-    ("both rigid", BALL.replace(*RIGID_2), "body_1: {young: 115 GPa, poisson: 0.29}",
-     "body_1: rigid", "materials.body_2", "both bodies are rigid"),
-    ("bulk stress in a rigid body", ROLLER, *RIGID_2, "materials.body_2", "bulk_stress_2"),
-    ("P and approach in one leg", BALL, "P: 400 N", "P: 400 N, approach: 1 um",
-     "load_path.legs.0.approach", "with P"),
-    ("force and motion in two legs", BALL, "- {P: 400 N}", "- {P: 400 N, shift_x: 1 um}",
-     "load_path.legs.0.shift_x", "with Qx"),
-    ("neither P nor approach", BALL, "P: 400 N", "Qy: 1 N", "load_path.legs",
-     "neither P nor approach"),
-    ("no legs", BALL, BALL[BALL.index("\n  legs:"):BALL.index("\ncontact")], " {legs: []}",
-     "load_path.legs", "neither given"),
-    ("one size on an area", BALL, "size: [1 mm, 1 mm]", "size: 1 mm", "contact.size", "not a list"),
-    ("two sizes on a line", ROLLER, "size: 2 mm", "size: [2 mm, 2 mm]", "contact.size",
-     "not a number"),
-    ("datum in the grid", ROLLER, "size: 2 mm", "size: 2 mm, datum: 1 mm", "contact.datum",
-     "at least the size, 2 mm"),
-    ("path that is not there", BALL, BALL[BALL.index("\n  legs:"):BALL.index("\ncontact")],
-     " {file: none.csv}", "load_path.file", "no such file"),
-    ("heights that are not there", BALL, "shape: sphere, radius: 10 mm",
-     "shape: heights, file: none.npy", "structure.file", "no such file"),
-    ("heights of another kind", BALL, "shape: sphere, radius: 10 mm",
-     "shape: heights, file: none.tif", "structure.file", ".npy, .csv, .h5"),
-    ("shear without friction", BALL, "friction: {coefficient: 0.7}\n", "", "friction",
-     "missing, but load_path has Qx"),
-    ("unlike bodies without friction", BALL.replace(*RIGID_2).replace("Qx: 210 N", "Mx: 1 N*mm"),
-     "friction: {coefficient: 0.7}\n", "", "friction", "missing, but dissimilar bodies rub"),
-]  # fmt: skip
+    (BALL, "shape: sphere, ", "", "structure.shape"),
+    (BALL, "sphere", "ellipsoid", "structure.radius"),
+    (BALL, RIGID_2[0], "  body_2: steel", "materials.body_2"),
+    (
+        BALL.replace(*RIGID_2),
+        RIGID_2[0].replace("2", "1", 1),
+        "  body_1: rigid",
+        "materials.body_2",
+    ),
+    (ROLLER, *RIGID_2, "materials.body_2"),
+    (BALL, "P: 400 N", "P: 400 N, approach: 1 um", "load_path.legs.0.approach"),
+    (BALL, "- {P: 400 N}", "- {P: 400 N, shift_x: 1 um}", "load_path.legs.0.shift_x"),
+    (BALL, "P: 400 N", "Qy: 1 N", "load_path.legs"),
+    (BALL, "size: [1 mm, 1 mm]", "size: 1 mm", "contact.size"),
+    (ROLLER, "size: 2 mm", "size: 2 mm, datum: 1 mm", "contact.datum"),
+    (BALL, SPHERE, "shape: heights, file: none.npy", "structure.file"),
+    (BALL, *NO_FRICTION, "friction"),
+    (BALL.replace(*RIGID_2).replace("Qx: 210 N", "Mx: 1 N*mm"), *NO_FRICTION, "friction"),
+]
 
 
 def refusal(text, name="case.yaml"):
@@ -69,25 +52,12 @@ def refusal(text, name="case.yaml"):
     return line
 
 
-@pytest.mark.parametrize(
-    ("base", "old", "new", "key", "words"),
-    [row[1:] for row in WRONG],
-    ids=[row[0] for row in WRONG],
-)
-def test_wrong_entry_is_told_in_one_line(base, old, new, key, words):
+@pytest.mark.parametrize(("base", "old", "new", "key"), WRONG)
+def test_wrong_entries_are_named(base, old, new, key):
     assert old in base
-    text = base.replace(old, new, 1)
     with pytest.raises(CaseError) as refused:
-        parse_case(text, "case.yaml")
-    lines = str(refused.value).splitlines()
-    (line,) = [line for line in lines if f": {key}: " in line]
-    place = re.match(rf"case\.yaml:(\d+): {re.escape(key)}: ", line)
-    assert place, line
-    assert words in line
-    # Of what is there, the line in the file is the entry's own.
-    if "missing" not in line:
-        written = [part for part in key.split(".") if not part.isdigit()][-1]
-        assert written in text.splitlines()[int(place[1]) - 1]
+        parse_case(base.replace(old, new, 1), "case.yaml")
+    assert f": {key}: " in str(refused.value)
 
 
 def test_bases_are_cases_that_read_back_equal():
@@ -100,12 +70,6 @@ def test_bases_are_cases_that_read_back_equal():
 def test_like_bodies_that_are_only_pressed_need_no_friction():
     pressed = BALL.replace("friction: {coefficient: 0.7}\n", "").replace("Qx: 210 N", "Mx: 1 N*mm")
     assert parse_case(pressed, "case.yaml").friction.coefficient == 0.0
-
-
-def test_rigid_body_is_written_as_a_word():
-    case = parse_case(BALL.replace(*RIGID_2), "case.yaml")
-    assert "body_2: rigid " in dump_case(case)
-    assert parse_case(dump_case(case), "dump") == case
 
 
 # --- path ---------------------------------------------------------------------------------------
@@ -163,41 +127,13 @@ def test_file_and_legs_are_the_same_path(tmp_path, heading, load):
 
 
 @pytest.mark.parametrize(
-    ("content", "line", "words"),
-    [
-        ("", 1, "no rows"),
-        ("P,bulk_stress1\n1,2\n", 1, "column; did you mean 'bulk_stress_1'?"),
-        ("P,P\n1,2\n", 1, "P: column given twice"),
-        ("P,Qx\n1,2\n1\n", 3, "1 values; allowed: 2"),
-        ("P,Qx\n1,2\n\n1,2,3\n", 4, "3 values; allowed: 2"),
-        ("P,Qx\n1,nan\n", 2, "Qx: nan: not a finite number"),
-        ("P,Qx\n-1,0\n", 2, "P: -1: out of range; allowed: 0 to 1e6 kN"),
-    ],
+    ("content", "line"), [("P,bulk_stress1\n1,2\n", 1), ("P,Qx\n1,2\n1\n", 3), ("P,Qx\n1,nan\n", 2)]
 )
-def test_wrong_path_file_is_told_with_both_lines(tmp_path, content, line, words):
+def test_a_wrong_path_file_is_refused_with_both_lines(tmp_path, content, line):
     file = tmp_path / "history.csv"
     file.write_text(content, encoding="utf-8")
     reported = refusal(with_file(BALL), tmp_path / "case.yaml")
-    assert reported.startswith(f"{tmp_path / 'case.yaml'}:8: load_path.file: {file}:{line}: "), (
-        reported
-    )
-    assert words in reported
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [("Qx\n1\n", "neither P nor approach"), ("P,approach\n1,0\n", "together with P")],
-)
-def test_columns_of_a_path_file_must_agree(tmp_path, content, words):
-    (tmp_path / "history.csv").write_text(content, encoding="utf-8")
-    reported = refusal(with_file(BALL), tmp_path / "case.yaml")
-    assert f"{tmp_path / 'case.yaml'}:8: load_path.file: " in reported
-    assert words in reported
-
-
-def test_path_file_of_a_line_has_no_moment_about_x(tmp_path):
-    (tmp_path / "history.csv").write_text("P,Mx\n1,0\n", encoding="utf-8")
-    assert "'Mx': unknown column" in refusal(with_file(ROLLER), tmp_path / "case.yaml")
+    assert reported.startswith(f"{tmp_path / 'case.yaml'}:8: load_path.file: {file}:{line}: ")
 
 
 # --- shapes -------------------------------------------------------------------------------------
@@ -242,55 +178,23 @@ def test_heights_are_read_as_written(tmp_path, heights, name):
     assert parse_case(dump_case(case), "elsewhere/case.yaml") == case
 
 
-def test_heights_of_one_column_are_a_line_contact(tmp_path):
-    np.save(tmp_path / "gap.npy", np.arange(64.0))
-    text = ROLLER.replace("shape: cylinder, radius: 10 mm", "shape: heights, file: gap.npy")
-    case = parse_case(text, str(tmp_path / "case.yaml"))
-    assert isinstance(case, LineContactCase)
-    assert case.structure.gap_on(case.contact.centred()).shape == (64, 1)
-
-
 def test_heights_on_another_grid_are_refused(tmp_path, heights):
-    text = BALL.replace("shape: sphere, radius: 10 mm", "shape: heights, file: gap.npy")
+    text = BALL.replace(SPHERE, "shape: heights, file: gap.npy")
     reported = refusal(text.replace("[16, 16]", "[16, 32]"), tmp_path / "case.yaml")
-    assert (
-        "contact.grid: 16 x 32 cells: the file of heights has 16 x 16; allowed: [16, 16]"
-        in reported
-    )
+    assert "contact.grid" in reported
+    assert "[16, 16]" in reported
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "words"),
+    ("name", "content"),
     [
-        ("gap.csv", b"1,2\n3\n", ":2: 1 values; allowed: 2"),
-        ("gap.csv", b"1,2\n3,x\n", ":2: 'x': not a number"),
-        ("gap.csv", b"", ":1: empty"),
-        ("gap.csv", b"\xff\xfe1", "cannot be read"),
-        ("gap.npy", b"no array", "cannot be read"),
-        ("gap.h5", b"no file", "which dataset?"),
-        ("gap.h5:a", b"no file", "cannot be read"),
+        ("gap.csv", b"1,2\n3\n"),
+        ("gap.csv", b"1,2\n3,x\n"),
+        ("gap.npy", b"no array"),
+        ("gap.h5:a", b""),
     ],
 )
-def test_wrong_heights_are_told(tmp_path, name, content, words):
+def test_wrong_heights_are_refused(tmp_path, name, content):
     (tmp_path / name.split(":")[0]).write_bytes(content)
-    text = BALL.replace("shape: sphere, radius: 10 mm", f"shape: heights, file: '{name}'")
-    reported = refusal(text, tmp_path / "case.yaml")
-    assert words in reported
-    assert ":3: structure.file: " in reported
-
-
-def test_heights_that_are_no_numbers_are_told(tmp_path):
-    for values, words in (
-        (np.zeros((2, 2, 2)), "3 dimensions"),
-        (np.array([["a"]]), "of type"),
-        (np.zeros((0, 3)), "allowed: numbers"),
-        (np.array([[1.0, 2.0], [3.0, np.nan]]), "row 2, column 2: not a finite number"),
-    ):
-        np.save(tmp_path / "gap.npy", values)
-        with pytest.raises(InputFileError, match=re.escape(words)):
-            read_heights(str(tmp_path / "gap.npy"))
-    with h5py.File(tmp_path / "gap.h5", "w") as file:
-        file["scan/gap"] = np.zeros((2, 2))
-    with pytest.raises(InputFileError, match="no such dataset; at the top: scan"):
-        read_heights(f"{tmp_path / 'gap.h5'}:scan")
-    assert len(FORCES) == 6
+    text = BALL.replace(SPHERE, f"shape: heights, file: '{name}'")
+    assert ":3: structure.file: " in refusal(text, tmp_path / "case.yaml")

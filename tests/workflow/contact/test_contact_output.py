@@ -1,8 +1,6 @@
 """Tests of summary, results, figures and ParaView files of contact runs, from closed forms."""
 
 import json
-import shutil
-from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
@@ -16,7 +14,6 @@ from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.types import Grid, Material
 from tests.workflow.output.shown_files import check_arrays, check_scene, total
 from workflow.analyses.contact import ANALYSIS
-from workflow.analyses.contact.output import figures
 from workflow.analyses.contact.output.layout import ContactContents
 from workflow.analyses.contact.output.results import ContactOutcome, write_contact_results
 from workflow.analyses.contact.output.summary import loop_summary, state_summaries
@@ -264,18 +261,6 @@ def test_figures_are_wide_and_not_blank(folder, tmp_path):
         assert np.any(imread(path)[..., :3] < 0.95, axis=-1).mean() > 0.02, path
 
 
-def test_maps_put_x_to_the_right_and_count_the_stick_zone(outcome, folder):
-    with h5py.File(folder.results) as file:
-        figure = figures.maps(file)
-    pressure, regions = (axis.images[0].get_array() for axis in figure.axes[:2])
-    assert pressure.shape == GRID.shape[::-1]
-    cells = regions.filled(0.0)
-    (summary,) = state_summaries(GRID, FRICTION, history(outcome.history.states[-1:]))
-    assert np.sum(cells == 1.0) * GRID.cell_area == pytest.approx(summary["stick_area"])
-    left, right, bottom, top = figure.axes[0].images[0].get_extent()
-    assert (right - left, top - bottom) == pytest.approx(GRID.size)
-
-
 def test_paraview_steps_through_the_increments(outcome, folder, tmp_path):
     written = write_paraview(ANALYSIS.pictures, AREA, folder.results, tmp_path)
     assert sorted(written) == sorted(path for path in tmp_path.rglob("*") if path.is_file())
@@ -324,14 +309,3 @@ def test_line_has_no_maps_and_is_a_line(tmp_path):
         assert grid_of(file["grid/bodies"]).line
         assert file["history/P"].attrs["unit"] == "N/mm"
         assert file["history/Edx"].attrs["unit"] == "N mm/mm"
-
-
-def test_what_is_zero_has_no_view(folder, tmp_path):
-    results = shutil.copy(folder.results, tmp_path)
-    with h5py.File(results, "r+") as file:
-        for state in file["contact/bodies"].values():
-            state["slip"][...] = 0.0
-    write_paraview(ANALYSIS.pictures, AREA, Path(results), tmp_path / "shown")
-    scene = check_scene(tmp_path / "shown" / "view.py")
-    colours = [view["shown"][0]["colour"] for view in scene["views"]]
-    assert colours == ["pressure [MPa]", "shear [MPa]"]

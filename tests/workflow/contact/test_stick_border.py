@@ -113,7 +113,7 @@ def test_a_punch_of_cells_is_narrower_than_these() -> None:
 
 
 @pytest.mark.parametrize("strips", [40, 48])
-def test_a_cylinder_tells_where_its_cells_put_the_border(tmp_path, strips) -> None:
+def test_the_grid_error_of_a_cylinder_in_partial_slip_is_estimated(tmp_path, strips) -> None:
     """Wear is 14 % too small on 40 cells, 17 % too large on 48, in two fixed steps."""
     found = errors(tmp_path, ("P: 700 N/mm", "Qx", "134.4 N/mm"), strips)
     assert_told(found, limit_of_cylinder(700.0, 134.4), most=1.6)
@@ -136,7 +136,7 @@ SPHERES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("load", SPHERES)
-def test_a_sphere_tells_where_its_cells_put_the_border(tmp_path, load) -> None:
+def test_the_grid_error_of_a_sphere_in_partial_slip_is_estimated(tmp_path, load) -> None:
     """Wear is 4 and 7 % too large on 48 cells; c = 0.18 mm, µE*(d - c²/R) = G* shift."""
     legs, exact = SPHERES[load]
     assert_told(errors(tmp_path, legs, 48, ", cycles: 5e6"), exact)

@@ -54,14 +54,6 @@ def test_claim_removes_only_what_the_earlier_run_wrote(case, folder):
     assert files(folder) == ["case.yaml", "jumps", "loops_mine.csv", "manifest.json", "notes.txt"]
 
 
-def test_a_folder_with_nothing_in_it_does_not_stay(case, folder):
-    folder.claim(case, force=False, resumable=True)
-    with folder.filling("paraview", "a test") as empty:
-        assert empty.is_dir()
-    assert not empty.exists()
-    assert "paraview" not in folder.manifest
-
-
 @pytest.mark.parametrize("force", [False, True])
 def test_own_files_in_the_folders_of_a_run_stay(case, folder, force):
     folder.claim(case, force=False, resumable=True)
@@ -100,61 +92,6 @@ def test_what_links_lead_to_stays(case, folder, tmp_path):
     assert sorted(outside.rglob("*")) == before
     assert not folder.results.is_symlink()
     assert not folder.jumps.is_symlink()
-
-
-def test_a_manifest_of_another_program_is_no_list_of_ours(case, folder):
-    folder.root.mkdir()
-    for name in ("main.js", "index.html"):
-        (folder.root / name).write_text("mine")
-    (folder.root / "manifest.json").write_text('{"main.js": "a.js", "index.html": "b"}')
-    with pytest.raises(UserError, match="no run of fretscale"):
-        folder.claim(case, force=False, resumable=False)
-    folder.claim(case, force=True, resumable=False)
-    assert (folder.root / "manifest.json.aside").read_text().startswith('{"main.js"')
-    assert {"main.js", "index.html"} <= set(files(folder))
-
-
-def test_a_summary_of_somebody_else_ends_no_run(case, folder):
-    folder.root.mkdir()
-    folder.summary.write_text("mine")
-    folder.claim(case, force=True, resumable=True)
-    assert not folder.summary.exists()
-    assert (folder.root / "summary.json.aside").read_text() == "mine"
-
-
-def test_kinds_of_folder_do_not_take_each_other_for_theirs(case, folder):
-    table = OutputFolder(folder.root, "sweep").reserve("sweep.csv", "a test")
-    table.write_text("old")
-    with pytest.raises(UserError, match="no run of fretscale"):
-        folder.claim(case, force=False, resumable=False)
-    folder.claim(case, force=True, resumable=False)
-    assert table.exists()
-    assert OutputFolder(folder.root, "sweep").manifest.keys() == {"sweep.csv"}
-
-
-def test_entries_are_listed_before_they_are_made(case, folder):
-    folder.claim(case, force=False, resumable=False)
-    path = folder.reserve("loops_left.csv", "loops of left")
-    assert not path.exists()
-    assert folder.manifest["loops_left.csv"] == "loops of left"
-    make(folder, "jumps.txt")
-    folder.discard("jumps.txt")
-    assert "jumps.txt" not in folder.manifest
-    assert files(folder) == ["case.yaml", "manifest.json"]
-
-
-def test_what_is_not_of_the_run_is_set_aside(case, folder):
-    folder.claim(case, force=False, resumable=False)
-    for text in ("first", "second"):
-        (folder.root / "worn.msh").write_text(text)
-        make(folder, "worn.msh")
-        folder.discard("worn.msh")
-    (folder.root / "figures").mkdir()
-    assert not folder.reserve("figures", "a test").exists()
-    assert files(folder) == [
-        *("case.yaml", "figures.aside", "manifest.json", "worn.msh.aside", "worn.msh.aside2")
-    ]
-    assert (folder.root / "worn.msh.aside").read_text() == "first"
 
 
 def test_a_manifest_leads_nowhere_else(case, folder):
@@ -217,14 +154,6 @@ def test_what_is_refused_and_what_force_takes(case, folder, prepare, words, stay
     assert files(folder) == sorted(["case.yaml", "jumps", "manifest.json", *kept])
 
 
-def test_finished_run_of_the_same_case_may_be_repeated(case, folder):
-    folder.claim(case, force=False, resumable=True)
-    folder.checkpoint.touch()
-    make(folder, "summary.json")
-    folder.claim(case, force=False, resumable=True)
-    assert not folder.summary.exists()
-
-
 @pytest.mark.parametrize("finished", [False, True])
 def test_a_run_of_its_own_stays_until_the_case_is_finished(case, folder, finished):
     """An example is the wear of a joint, which takes longest."""
@@ -239,7 +168,7 @@ def test_a_run_of_its_own_stays_until_the_case_is_finished(case, folder, finishe
 
 
 @pytest.mark.slow
-def test_a_run_beside_what_is_not_its_own_says_so(start, tmp_path):
+def test_a_run_warns_of_files_that_it_did_not_write(start, tmp_path):
     (tmp_path / "worn.msh").write_text("mine")
     run = start(tmp_path, "wear.cycles=1e4", "contact.grid=[16, 24]", force=True)
     assert run.ending.exit_code == 0
@@ -257,14 +186,6 @@ def test_out_that_is_no_folder_is_one_line(start, tmp_path, place):
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_refusal_reaches_the_command_line(start, tmp_path):
-    (tmp_path / "thesis.tex").write_text("mine")
-    run = start(tmp_path)
-    assert run.ending.exit_code == 2
-    (line,) = run.ending.stderr.splitlines()
-    assert "--force" in line
-
-
 def test_resume_of_no_run_is_one_line(resume, tmp_path):
     run = resume(tmp_path)
     assert run.ending.exit_code == 2
@@ -278,8 +199,3 @@ def test_resume_of_a_finished_run_does_nothing(whole, resume):
     assert run.ending.exit_code == 0
     assert "finished" in run.ending.stdout
     assert {path: path.stat().st_mtime_ns for path in whole.folder.rglob("*")} == before
-
-
-def test_commands_that_are_proposed_can_be_pasted(tmp_path):
-    folder = OutputFolder(tmp_path / "Prüfstand, 2. Lauf")
-    assert folder.resume_command == f"fretscale resume '{folder.root}'"

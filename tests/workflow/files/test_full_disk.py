@@ -13,12 +13,10 @@ import pytest
 from tests.marks import slow
 from tests.workflow.command_line import runs_here
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
-from workflow.errors import MethodFailed, NotWritten
+from workflow.errors import NotWritten
 from workflow.kinds import load_case
-from workflow.layout.declared import Layout
 from workflow.runs.run import resume_run, run_case
-from workflow.shell.folders.store import read_arrays, replacing, write_arrays, write_text
-from workflow.shell.output.results import writing
+from workflow.shell.folders.store import write_arrays, write_text
 
 # Seconds within which a command has ended.
 PATIENCE = 120.0
@@ -107,22 +105,6 @@ def test_hdf5_on_a_full_disk_is_an_error_and_no_crash(room, tmp_path):
     assert (tmp_path / "a.h5").read_text() == "old"
 
 
-def test_arrays_are_read_back(tmp_path):
-    write_arrays(tmp_path / "a.h5", ARRAYS, {"title": "all"})
-    arrays, attributes = read_arrays(tmp_path / "a.h5")
-    np.testing.assert_equal(arrays, ARRAYS)
-    assert attributes == {"title": "all"}
-
-
-def test_an_error_of_whoever_writes_is_told_as_it_is(tmp_path):
-    with pytest.raises(MethodFailed, match="mine"), writing(tmp_path / "a.h5", Layout({})):
-        raise MethodFailed("mine")
-    with pytest.raises(FileNotFoundError) as raised, replacing(tmp_path / "a.txt"):
-        (tmp_path / "other.txt").read_text()
-    assert raised.value.filename == str(tmp_path / "other.txt")
-    assert names(tmp_path) == []
-
-
 # --- runs -----------------------------------------------------------------------------------------
 
 
@@ -198,54 +180,3 @@ def test_output_that_cannot_be_written_is_one_line(arguments):
         ending = command(*arguments, stdout=full)
     assert ending.returncode == 3
     assert ending.stderr == "fretscale: output: No space left on device\n"
-
-
-@linux_only
-def test_nothing_is_said_where_nothing_can_be(ball, tmp_path):
-    with FULL.open("w") as full:
-        assert command("no-such-command", stderr=full).returncode == 2
-        ending = command("run", ball, "--out", tmp_path / "out", stdout=full, stderr=full)
-    assert ending.returncode == 3
-    assert "case.yaml" in names(tmp_path / "out")
-    assert not (tmp_path / "out/summary.json").exists()
-
-
-@posix_only
-@pytest.mark.parametrize("arguments", [["schema"], slow(["--help"])])
-def test_who_stops_reading_has_had_enough(arguments):
-    """A reader such as `head` may close the output without an error message."""
-    read, write = os.pipe()
-    os.close(read)
-    ending = command(*arguments, stdout=write)
-    os.close(write)
-    assert ending.returncode == 3
-    assert ending.stderr == ""
-
-
-@posix_only
-@pytest.mark.parametrize(
-    "arguments", [["check"], slow(["new"]), slow(["materials"]), slow(["schema"]), ["--help"]]
-)
-def test_output_that_nobody_wants_is_left_out(arguments, ball):
-    """With >&- there is no stdout at all."""
-    closed = f"import os; os.close(1); {COMMAND}"
-    if arguments == ["check"]:
-        arguments = ["check", ball]
-    ending = command(*arguments, code=closed)
-    assert (ending.returncode, ending.stderr) == (0, "")
-
-
-@pytest.mark.slow
-@posix_only
-def test_a_run_that_nobody_listens_to_ends_and_is_repeated(ball, tmp_path):
-    read, write = os.pipe()
-    os.close(read)
-    arguments = "run", ball, "--out", tmp_path / "out"
-    ending = command(*arguments, stdout=write, stderr=write)
-    os.close(write)
-    assert ending.returncode == 3
-    assert names(tmp_path / "out") == ["case.yaml", "manifest.json", "run.log"]
-    # Without any stream: libraries print into no file of the run.
-    closed = f"import os; [os.close(number) for number in range(3)]; {COMMAND}"
-    assert command(*arguments, code=closed).returncode == 0
-    assert (tmp_path / "out/summary.json").exists()

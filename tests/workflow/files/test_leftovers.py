@@ -1,7 +1,6 @@
 """Files left by a run that was killed after its summary are removed when the run is resumed."""
 
 import json
-import os
 import shutil
 import socket
 import warnings
@@ -137,20 +136,3 @@ def test_runs_of_every_kind_are_cleared(kind, tmp_path):
         check_clean(run, run.cut)
     check_units_of_curves(runs[0].whole)
     check_opens_in_xarray(runs[0].whole)
-
-
-def test_what_somebody_put_there_stays(joint, tmp_path):
-    cut = shutil.copytree(joint.cut, tmp_path / "cut")
-    (cut / "jumps").mkdir(exist_ok=True)
-    (cut / "jumps/mine.txt").write_text("mine")
-    resumed(cut)
-    assert [path.name for path in (cut / "jumps").iterdir()] == ["mine.txt"]
-    assert "jumps" not in OutputFolder(cut).manifest
-
-
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="permissions of a user")
-def test_a_finished_run_may_be_read_only(joint, tmp_path):
-    cut = shutil.copytree(joint.whole, tmp_path / "whole")
-    cut.chmod(0o500)
-    resumed(cut)
-    cut.chmod(0o700)

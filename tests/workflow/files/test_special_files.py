@@ -9,11 +9,9 @@ import pytest
 
 from tests.workflow.command_line import command, runs_here
 from tests.workflow.scenes import ROLLER_LOADS, ROLLER_WEAR
-from workflow.errors import UserError
 from workflow.kinds import load_case
-from workflow.runs.run import run_case, stored_run
-from workflow.shell.folders import cache, store
-from workflow.shell.folders.lock import LOCK, locked
+from workflow.runs.run import run_case
+from workflow.shell.folders.lock import LOCK
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="pipes of POSIX")
 # Seconds after which whoever waits for a pipe is woken.
@@ -71,7 +69,7 @@ def run(uncleared, tmp_path):
     return shutil.copytree(uncleared / "out", tmp_path / "out")
 
 
-OF_UNFINISHED = ["checkpoint.h5", "jumps/00001.h5", "manifest.json", "case.yaml", LOCK]
+OF_UNFINISHED = ["checkpoint.h5", "jumps/00001.h5", "manifest.json", LOCK]
 
 
 @pytest.mark.parametrize("name", OF_UNFINISHED)
@@ -82,42 +80,3 @@ def test_in_an_unfinished_run(run, put, name):
     assert ended.exit_code == 2
     (line,) = ended.stderr.splitlines()
     assert f"{run / name}: not a file: a pipe or a device" in line
-
-
-@pytest.mark.parametrize("name", ["summary.json", "results.h5"])
-def test_in_a_finished_run(run, put, name):
-    put(run / name)
-    ended = command("resume", run)
-    assert ended.exit_code == 2
-    (line,) = ended.stderr.splitlines()
-    assert f"{run / name}: not a file: a pipe or a device" in line
-    assert stored_run(run, load_case(run / "case.yaml")) == "nothing"
-
-
-def test_in_the_place_of_the_log(run, put):
-    (run / "summary.json").unlink()
-    put(run / "run.log")
-    ended = command("resume", run)
-    assert ended.exit_code == 2
-    assert f"{run / 'run.log'}: not a file: a pipe or a device" in ended.stderr
-
-
-def test_in_a_folder_that_a_command_locks(tmp_path, put):
-    put(tmp_path / LOCK)
-    with pytest.raises(UserError, match="not a file: a pipe or a device"), locked(tmp_path):
-        pass
-
-
-def test_in_the_cache(tmp_path, put, monkeypatch, caplog):
-    monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path))
-    put(tmp_path / "joint-0.h5")
-    assert cache.load_arrays("joint-0") is None
-    assert "computed again" in caplog.text
-    cache.save_arrays("joint-0", {"a": 1})
-    assert cache.load_arrays("joint-0") == {"a": 1}
-
-
-def test_what_a_device_has_is_no_digest(tmp_path, put):
-    put(tmp_path / "file")
-    with pytest.raises(store.DamagedFile, match="not a file"):
-        store.file_digest(tmp_path / "file")

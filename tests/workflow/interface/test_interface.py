@@ -1,6 +1,7 @@
 """Tests of ``import fretscale``: cases from dictionaries, runs, and results as arrays."""
 
-import os
+import json
+import re
 import shutil
 import warnings
 from pathlib import Path
@@ -39,7 +40,7 @@ def ball(tmp_path_factory):
 # --- cases ----------------------------------------------------------------------------------------
 
 
-def test_a_dictionary_says_what_a_file_says():
+def test_a_dictionary_is_the_same_case_as_its_file():
     from workflow.case.source import Source
 
     text = SPHERE.read_text("utf-8")
@@ -58,20 +59,9 @@ def test_files_of_a_dictionary_are_looked_for_from_the_current_folder(tmp_path, 
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [
-        ("wear.cycles", "many"),
-        ("wear.cycles", float("nan")),
-        ("wear.cycles", None),
-        ("friction.coefficient", -1),
-        ("contact.grid", [64, "x"]),
-        ("contact.grd", 3),
-        ("contact", {"grid": 3}),
-        ("load_path.increments", True),
-    ],
+    [("wear.cycles", "many"), ("wear.cycles", None), ("contact.grd", 3), ("contact", {"grid": 3})],
 )
-def test_a_wrong_override_is_told_as_on_the_command_line(name, value, dovetail_path):
-    import json
-
+def test_a_wrong_override_is_refused_as_on_the_command_line(name, value, dovetail_path):
     from workflow.kinds import load_case
 
     text = value if isinstance(value, str) else json.dumps(value)
@@ -80,29 +70,21 @@ def test_a_wrong_override_is_told_as_on_the_command_line(name, value, dovetail_p
     with pytest.raises(fretscale.CaseError) as here:
         fretscale.load_case(dovetail_path, **{name.replace(".", "__"): value})
     assert str(here.value) == str(there.value)
-    with pytest.raises(fretscale.CaseError) as dotted:
-        fretscale.load_case(dovetail_path, **{name: value})
-    assert str(dotted.value) == str(there.value)
 
 
 @pytest.mark.parametrize(
-    ("case", "reported"),
+    ("case", "named"),
     [
-        ({}, "the case: analysis: missing; allowed: wear, "),
-        (None, "the case: of type NoneType; allowed: the path of a file, a dictionary, a case"),
-        ([BALL], "the case: of type list"),
-        (fretscale.load_case(SPHERE).friction, "the case: of type Friction; allowed: the path"),
-        (BALL | {"title": object()}, "the case: title: of type object; allowed: number, text"),
-        (BALL | {"friction": 0.3}, "the case: friction: 0.3: not a section"),
-        (BALL | {"frction": {}}, "the case: frction: unknown key; did you mean 'friction'?"),
-        ("no.yaml", "no.yaml: no such file"),
+        ({}, "analysis"),
+        ([BALL], "list"),
+        (BALL | {"title": object()}, "title"),
+        (BALL | {"frction": {}}, "'friction'"),
+        ("no.yaml", "no.yaml"),
     ],
 )
-def test_a_wrong_case_is_one_line(case, reported):
-    with pytest.raises(fretscale.CaseError) as error:
+def test_a_wrong_case_is_refused(case, named):
+    with pytest.raises(fretscale.CaseError, match=named):
         fretscale.load_case(case)
-    assert str(error.value).startswith(reported)
-    assert "\n" not in str(error.value)
 
 
 def test_overrides_change_a_loaded_case():
@@ -115,7 +97,7 @@ def test_overrides_change_a_loaded_case():
     assert changed.load_path.legs[0].P == 1000.0
 
 
-def test_a_check_says_what_the_command_says(monkeypatch):
+def test_check_returns_what_the_command_prints(monkeypatch):
     checked = fretscale.check(SPHERE, contact__grid=[64, 64])
     assert "64 x 64 cells" in dict(checked.outline)["contact"]
     assert "64 x 64 cells" in str(checked)
@@ -182,7 +164,7 @@ def opened_by_xarray(folder):
         return xarray.open_datatree(folder / "results.h5", engine="h5netcdf")
 
 
-def test_results_say_what_they_are(ball):
+def test_results_have_units_and_descriptions(ball):
     assert ball.title == "Ball on a flat"
     assert ball.case == fretscale.load_case(BALL)
     assert ball.summary["title"] == ball.title
@@ -215,10 +197,6 @@ def test_datasets_are_labelled_arrays(ball):
     assert x.units == "mm"
     cell = float((x[1] - x[0]) * (y[1] - y[0]))
     assert float(pressure.sum()) * cell == pytest.approx(400.0, rel=1e-6)
-
-
-def test_axes_have_their_coordinates(ball):
-    assert coordinates_of(ball) == {"x", "y", "increment"}
 
 
 def test_xarray_opens_the_results_as_they_are(ball):
@@ -264,57 +242,20 @@ def test_pandas_has_units_and_an_index(ball):
     assert table.index.name == "increment"
     assert list(table["P [N]"]) == pytest.approx([400.0] * 3)
     assert table["Qx [N]"].loc[2] == pytest.approx(200.0)
-    with pytest.raises(fretscale.UserError, match="contact/bodies/00003: no table; allowed: "):
+    with pytest.raises(fretscale.UserError, match="contact/bodies/00003"):
         ball["contact/bodies/00003"].pandas()
     assert list(ball["contact/bodies"].pandas().index) == [1, 2, 3]
 
 
 def test_folders_without_whole_results_are_refused(ball, tmp_path):
-    with pytest.raises(fretscale.UserError, match="no run of fretscale here"):
+    with pytest.raises(fretscale.UserError, match=re.escape(str(tmp_path))):
         fretscale.open(tmp_path)
     folder = shutil.copytree(ball.folder, tmp_path / "out")
     with Path(folder, "results.h5").open("r+b") as file:
         file.seek(2000)
         file.write(b"x")
-    with pytest.raises(fretscale.UserError, match=r"results.h5: differs from the run"):
-        fretscale.open(folder)
-    Path(folder, "summary.json").write_text("{}", encoding="utf-8")
-    with pytest.raises(fretscale.UserError, match=r"summary\.json: damaged"):
+    with pytest.raises(fretscale.UserError, match=r"results\.h5"):
         fretscale.open(folder)
     Path(folder, "summary.json").unlink()
-    with pytest.raises(fretscale.UserError, match="this run is not finished; start it again"):
+    with pytest.raises(fretscale.UserError, match="not finished"):
         fretscale.open(folder)
-
-
-def test_results_that_another_run_has_replaced_are_not_read(ball, tmp_path):
-    folder = shutil.copytree(ball.folder, tmp_path / "out")
-    results = fretscale.open(folder)
-    os.utime(folder / "results.h5", ns=(1, 1))
-    with pytest.raises(fretscale.UserError, match="replaced or removed since it was opened"):
-        _ = results["contact/bodies/00001/pressure"]
-
-
-def test_results_may_lie_without_the_files_that_they_came_from(ball, tmp_path, monkeypatch):
-    """A colleague has the folder, but not the files that its case names."""
-    folder = shutil.copytree(ball.folder, tmp_path / "out")
-    from workflow.shell.folders.folder import OutputFolder
-
-    kept = OutputFolder.read_summary
-    gone = {"/no/such/loads.csv": "0" * 64}
-    monkeypatch.setattr(
-        OutputFolder,
-        "read_summary",
-        lambda self: (s := kept(self)) | {"digests": s["digests"] | gone},
-    )
-    assert fretscale.open(folder).title == ball.title
-
-
-def test_main_results_print_as_a_table(ball):
-    lines = str(ball.main).splitlines()
-    rows = [line for line in lines if line.startswith("  ")]
-    assert len(rows) == len(ball.main)
-    for row, result in zip(rows, ball.main, strict=True):
-        assert row.split("  ")[1].strip() == result.name
-    # Values begin in one column.
-    (load,) = (row for row in rows if "normal force" in row)
-    assert load.endswith("400 N")

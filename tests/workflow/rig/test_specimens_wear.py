@@ -198,7 +198,7 @@ class TestLaws:
             "wear.body_1={law: archard, coefficient: 1e-6, hardness: 4 GPa}",
             "wear.body_2.evolution={scope: global, energy: [0, 1], factor: [1, 2]}",
         ):
-            with pytest.raises(CaseError, match="given for a body that wears by archard"):
+            with pytest.raises(CaseError, match="archard"):
                 laws(reported, other)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sa_solver.types import Grid
-from tests.workflow.command_line import invoke
+from tests.workflow.command_line import command
 from workflow.analyses.contact.case import ContactGrid
 from workflow.errors import UserError
 from workflow.shell.few_cells import check_cells
@@ -33,9 +33,8 @@ class Warnings(list):
 
 def run(tmp_path, text, *settings):
     (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
-    overrides = [part for entry in settings for part in ("--set", entry)]
     out = tmp_path / "out"
-    done = invoke("run", tmp_path / "case.yaml", "--out", out, "--force", *overrides)
+    done = command("run", tmp_path / "case.yaml", "--out", out, "--force", overrides=settings)
     if done.exit_code:
         return done, []
     return done, json.loads((out / "summary.json").read_text("utf-8"))["warnings"]
@@ -84,5 +83,5 @@ def test_one_that_has_worn_to_a_point_is_warned_of():
     pressure[10, 10] = 1.0
     check_cells("pad", settings, grid, pressure, reported, worn=True)
     assert "pad is only 1 x 1 cells across after wear" in reported[0]
-    with pytest.raises(UserError, match="its size and pressure are meaningless"):
+    with pytest.raises(UserError, match="meaningless"):
         check_cells("pad", settings, grid, pressure, reported)

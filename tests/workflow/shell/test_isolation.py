@@ -4,7 +4,6 @@ import errno
 import json
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +11,10 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.dynamics.curves.curve_steps import ContinuationControl
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.periodic.harmonics import Resolution
-from fe_models.dynamics.periodic.load import PeriodicLoad
-from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from tests.workflow.command_line import invoke, runs_here
-from wear.joints.elastic import PolynomialSpring
-from wear.joints.periodic.march import PeriodicMarch
-from workflow.analyses.vibration.figures import response as figures
-from workflow.kinds import analysis_of
 from workflow.runs import run as running
 from workflow.shell.forecast import Forecast
-from workflow.shell.terminal import reporter, screen
+from workflow.shell.terminal import reporter
 from workflow.shell.terminal.reporter import Reporter
 
 CASE = """
@@ -74,21 +64,10 @@ def prints_fail(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(reporter, "console", Gone)
 
 
-def run_time_fails(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(running, "analysis_of", lambda case: replace(analysis_of(case), run_time=fails))
-
-
 FAILURES: dict[str, tuple[str, Callable[[pytest.MonkeyPatch], Any]]] = {
     "forecast": ("progress:", lambda patch: patch.setattr(Forecast, "reach", fails)),
-    "expected time": ("progress:", run_time_fails),
-    "rows": ("progress on", lambda patch: patch.setattr(screen._Rows, "update", fails)),
-    "removed rows": ("progress on", lambda patch: patch.setattr(screen._Rows, "reset", fails)),
     "log": ("run.log:", log_fails),
     "terminal": ("terminal:", prints_fail),
-    "figure": (
-        "figures/frequency_response:",
-        lambda patch: patch.setattr(figures, "frequency_response", fails),
-    ),
     "figures": ("figures:", lambda patch: patch.setattr(running, "write_pictures", fails)),
     "report": ("report.html:", lambda patch: patch.setattr(running, "write_page", fails)),
 }
@@ -130,23 +109,6 @@ def test_what_only_shows_a_run_fails_and_the_run_does_not(what, whole, tmp_path,
     assert "the results are complete" in warning
     page = tmp_path / "out" / "report.html"
     assert page.exists() == (what != "report")
-
-
-def test_a_force_that_is_raised_is_no_progress_along_frequencies() -> None:
-    """Raising the force from rest follows a separate curve, which must not count as progress.
-
-    Otherwise forces are reported as frequencies, and the forecast gets a share below 0.
-    """
-    model = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], damping_ratio=0.02)
-    spring = PeriodicMarch(PolynomialSpring(0.0, cubic=1.0))
-    load = PeriodicLoad({1: unit_force(model, "m")})
-    problem = HarmonicBalance(model, spring, load, Resolution((1, 3), 64))
-    watched: list[float] = []
-    control = ContinuationControl(watch=watched.append)
-    # Newton's method does not get there directly.
-    found = problem.find(0.2, 1.0, np.full(problem.size, 1e3), control)
-    assert found.converged
-    assert watched == []
 
 
 @pytest.mark.parametrize(("share", "done"), [(-0.5, 0.0), (np.nan, 0.0), (1.5, 1.0)])

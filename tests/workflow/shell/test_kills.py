@@ -25,7 +25,6 @@ from tests.workflow.vibration.test_vibration_wear import RIG as WEARING_RIG
 from tests.workflow.vibration.test_vibration_wear import WEAR as BALL
 from tests.workflow.vibration.time_scenes import HAMMER, JOINT
 from tests.workflow.vibration.time_scenes import RIG as RIG_IN_TIME
-from workflow.shell.folders import steps
 from workflow.shell.folders.lock import LOCK
 from workflow.shell.folders.steps import RunSteps
 from workflow.shell.folders.store import read_arrays
@@ -33,13 +32,9 @@ from workflow.shell.folders.store import read_arrays
 # Files with times, durations or stored states, which are no results. A run that is killed after all
 # results are written leaves its stored states.
 NOT_RESULTS = {LOCK, "run.log", "checkpoint.h5", "manifest.json", "summary.json"}
-QUIET = "output={figures: false, paraview: false}"
 # In the report: how long each stage took.
 TIMES = re.compile(rb'<section id="time">.*?</section>', re.DOTALL)
-# Seconds within which a run must have ended.
-PATIENCE = 300.0
-# Kills of every kind, more than 50 in all, the most that one run takes, and runs at most.
-KILLS, IN_ONE_RUN, MOST_RUNS = 6, 4, 20
+QUIET = "output={figures: false, paraview: false}"
 
 VIBRATION = (
     RIG_OF_THESIS
@@ -186,121 +181,30 @@ def test_every_step_can_be_the_last(kind, tmp_path):
 # --- killed --------------------------------------------------------------------------------------
 
 posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-# How often steps are brought to the disk, by what that may take: as shipped, or each of them.
-AS_SHIPPED = (steps.SHARE, steps.FIRST_SAVE)
 EVERY_STEP = (float("inf"), 0.0)
 
 
-@dataclass(frozen=True)
-class Kill:
-    """State of a run when it was killed: steps ``kept`` then, and ``before`` by earlier processes.
-
-    ``lost`` are the seconds since the last of them was stored.
-    """
-
-    before: int
-    kept: int
-    lost: float
-
-
-def killed(
-    command: list[object], out: Path, seconds: float, saves: tuple[float, float]
-) -> Kill | float:
-    """Run as a process and kill it after some seconds; return the run time if it ended before.
-
-    Time counts from the first stored step, or from the first line of its log if few are stored.
-    """
-    log, path, before = out / "run.log", out / "checkpoint.h5", kept_in(out)
-    mark = path if saves == EVERY_STEP else log
-    written = mark.stat().st_mtime_ns if mark.exists() else 0
-    process = forked.start([str(word) for word in command], *saves)
-    end = time.monotonic() + PATIENCE
-    while process.exitcode is None and not (mark.exists() and mark.stat().st_mtime_ns > written):
-        assert time.monotonic() < end
-        time.sleep(0.01)
-    begun = time.time()
-    process.join(seconds)
-    if process.exitcode is not None:
-        assert process.exitcode == 0
-        return time.time() - begun
-    process.kill()
-    process.join()
-    moment, kept = time.time(), kept_in(out)
-    last = max(begun, path.stat().st_mtime) if path.exists() else begun
-    return Kill(before, kept, moment - last)
-
-
-def kill_at_random(
-    command: list[object],
-    out: Path,
-    dice: random.Random,
-    whole: float,
-    saves: tuple[float, float],
-    most: int,
-) -> tuple[list[Kill], float]:
-    """Kill a run and its resumptions at random moments of the ``whole`` seconds; then let it end.
-
-    Returns the kills, and the total seconds if the run ended before the first of them.
-    """
-    kills: list[Kill] = []
-    for _ in range(most):
-        kill = killed(command, out, dice.uniform(0.0, whole), saves)
-        if isinstance(kill, float):
-            whole = whole if kills else kill
-            break
-        # Nothing that was kept is lost again.
-        assert kill.kept >= kill.before
-        kills.append(kill)
-        command = ["resume", out] if (out / "case.yaml").exists() else command
-    if not (out / "summary.json").exists():
-        run_here(command)
-        assert not list(out.rglob("*.part.*"))
-        assert not (out / "jumps").exists()
-    return kills, whole
-
-
-def kills_of(kind: str, folder: Path, most: int) -> list[Kill]:
-    """Kill runs of a kind ``most`` times, with each step stored or as rarely as in real use.
-
-    More than half of the kills must hit a process that had advanced beyond earlier ones. The final
-    results must equal those of an undisturbed run.
-    """
-    dice, kills, whole = random.Random(20), [], folder / "whole"
+@posix_only
+@pytest.mark.parametrize("kind", EVERY_KIND)
+def test_a_run_that_is_killed_at_random_loses_no_stored_step(kind, tmp_path):
+    """Resumptions of three kills end with the results of an undisturbed run."""
+    dice, whole, out = random.Random(20), tmp_path / "whole", tmp_path / "parts"
     begun = time.monotonic()
-    run_here(RUNS[kind].command(folder, whole))
-    seconds = time.monotonic() - begun
-    reference, (total, _) = results_of(whole), counted(whole)
-    for number in range(MOST_RUNS):
-        if len(kills) >= most and 2 * sum(kill.kept > kill.before for kill in kills) > most:
+    run_here(RUNS[kind].command(tmp_path, whole))
+    seconds, command, kept = time.monotonic() - begun, RUNS[kind].command(tmp_path, out), 0
+    for _ in range(3):
+        process = forked.start([str(word) for word in command], *EVERY_STEP)
+        while process.exitcode is None and kept_in(out) == kept:
+            process.join(0.02)
+        process.join(dice.uniform(0.0, 0.3 * seconds))
+        process.kill()
+        process.join()
+        assert kept_in(out) >= kept
+        if process.exitcode == 0:
             break
-        # The first step that is kept has the start behind it.
-        saves, share = (AS_SHIPPED, 1.0) if number % 3 == 2 else (EVERY_STEP, 0.5)
-        out = folder / str(number)
-        most_now = min(IN_ONE_RUN, max(most - len(kills), 1))
-        command = RUNS[kind].command(folder, out)
-        # The first run of all may have been long, with functions to compile.
-        new, within = kill_at_random(command, out, dice, share * seconds, saves, most_now)
-        seconds = within / share
-        assert results_of(out) == reference
-        computed, kept = counted(out)
-        # Nothing that was kept has been computed again.
-        assert computed + kept == total
-        # By the process after the last kill, or that one if it was all but at its end.
-        assert not new or kept in (new[-1].kept, new[-1].before)
-        kills += new
-    return kills
-
-
-@posix_only
-def test_a_killed_run_goes_on(tmp_path):
-    assert len(kills_of("joint", tmp_path, 1)) >= 1
-
-
-@posix_only
-@pytest.mark.slow
-@pytest.mark.long
-@pytest.mark.parametrize("kind", list(RUNS))
-def test_random_kills_lose_nothing_but_the_last_step(kind, tmp_path):
-    kills = kills_of(kind, tmp_path, KILLS)
-    assert len(kills) >= KILLS
-    assert 2 * sum(kill.kept > kill.before for kill in kills) > KILLS
+        kept, command = kept_in(out), ["resume", out]
+    else:
+        run_here(command)
+        assert counted(out)[1] == kept
+    assert results_of(out) == results_of(whole)
+    assert not list(out.rglob("*.part.*"))

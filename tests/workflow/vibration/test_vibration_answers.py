@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.workflow.vibration.test_vibration_case import ONE_MASS, RIG, SAMPLED, STIFFNESS
-from tests.workflow.vibration.time_scenes import receptance, refused, run
+from tests.workflow.vibration.test_vibration_case import RIG, SAMPLED, STIFFNESS
+from tests.workflow.vibration.time_scenes import receptance, run
 from workflow.shell.output.results import own
 
 FORCE, AT = 2.0, (75.0, 120.0)
@@ -70,7 +70,7 @@ def test_harmonics_are_those_of_the_closed_form(stuck):
         np.testing.assert_allclose(motion["displacement"][1], 0.0, atol=1e-9 * size)
 
 
-def test_tables_say_their_units_and_convention(stuck):
+def test_tables_have_their_units_and_convention(stuck):
     folder, _ = stuck
     with (folder / "out" / "harmonics_00000.csv").open(encoding="utf-8") as file:
         assert "Re(c_k exp(i k 2 pi f t))" in file.readline()
@@ -87,24 +87,3 @@ def test_tables_say_their_units_and_convention(stuck):
     with (folder / "out" / "at_00000.csv").open(encoding="utf-8") as file:
         asked = list(csv.DictReader(file))
     assert [row["frequency [Hz]"] for row in asked] == ["75", "120"]
-
-
-def test_a_curve_that_does_not_get_there_says_so(tmp_path):
-    summary = run(tmp_path, ONE_MASS, "at=[150 Hz]", "continuation.most_points=5")
-    (answer,) = summary["responses"][0]["at"]
-    assert answer["motions"] == []
-    assert answer["message"].startswith("none: the curve from 80 to ")
-    assert any("at 150 Hz: none: the curve" in warning for warning in summary["warnings"])
-
-
-@pytest.mark.parametrize(
-    ("entry", "message"),
-    [
-        ("at=[10 Hz]", "10 Hz: outside; allowed: within frequencies, 80 to 200 Hz"),
-        ("at=[120 Hz, 100 Hz]", "not ascending; allowed: ascending frequencies"),
-    ],
-)
-def test_nonsense_is_refused_with_its_place(tmp_path, entry, message):
-    code, reported = refused(tmp_path, ONE_MASS, entry)
-    assert code == 2
-    assert message in reported

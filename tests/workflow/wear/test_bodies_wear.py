@@ -13,14 +13,13 @@ import pytest
 from tests.marks import slow
 from tests.workflow.command_line import command
 from wear.contact.interface import InterfaceState
-from workflow.analyses.wear import recording
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.analyses.wear.structures.bodies.model import source_of
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError
-from workflow.kinds import load_case, parse_case, template
+from workflow.kinds import parse_case, template
 from workflow.models.contact import FaceContact
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -67,23 +66,10 @@ def worn(
         (LINE, f"structure={STRIP}", LineBodiesWearCase),
     ],
 )
-def test_shape_or_size_say_whether_bodies_touch_along_a_line(text, override, kind) -> None:
+def test_shape_and_size_decide_whether_bodies_touch_along_a_line(text, override, kind) -> None:
     case = parse_case(text, "case.yaml", [override])
     assert isinstance(case, kind)
     assert parse_case(dump_case(case), "dump") == case
-
-
-@pytest.mark.parametrize(
-    ("override", "words"),
-    [
-        ("structure.shape=cylinder", "allowed:"),  # an area has two sizes
-        ("load_path.legs=[]", "unknown key; allowed: P, stroke, direction, increments, tilt"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(override: str, words: str) -> None:
-    with pytest.raises(CaseError) as refusal:
-        area(override)
-    assert words in str(refusal.value)
 
 
 def test_heights_must_suit_the_grid(tmp_path: Path) -> None:
@@ -91,13 +77,6 @@ def test_heights_must_suit_the_grid(tmp_path: Path) -> None:
     heights = "structure={kind: bodies, shape: heights, file: gap.npy}"
     with pytest.raises(CaseError, match=r"allowed: \[30, 40\]"):
         parse_case(AREA, str(tmp_path / "case.yaml"), [*SMALL, heights])
-
-
-@pytest.mark.parametrize("name", ["cylinder_wear", "sphere_wear"])
-def test_cases_of_the_repository_expect_something(name: str) -> None:
-    case = load_case(CASES / f"{name}.yaml")
-    assert isinstance(case, BodiesWearCase | LineBodiesWearCase)
-    assert case.expect
 
 
 # --- the loads ----------------------------------------------------------------------------------
@@ -220,7 +199,7 @@ def test_wear_beyond_the_grid_is_refused_with_the_remedy() -> None:
     from wear.steps.stepping import ContactFailure
 
     case = area("load_path.stroke=0.9 mm", "wear.cycles=10", "load_path.increments=2")
-    with pytest.raises(ContactFailure, match="beyond the end of the grid along x: make the grid"):
+    with pytest.raises(ContactFailure, match="grid along x"):
         worn(case, 1)
 
 
@@ -342,7 +321,7 @@ def worn_over_50_um(folder: Path, step: str) -> tuple[dict[str, Any], list[str]]
 
 
 @pytest.mark.slow
-def test_a_run_says_what_its_steps_leave_of_the_pressure(tmp_path) -> None:
+def test_a_run_estimates_the_pressure_error_of_its_steps(tmp_path) -> None:
     """Long steps cause pressure peaks at the worn edges, and the advised setting removes them.
 
     160 steps of second order give 151.9 MPa to 2 %; more increments give less.
@@ -359,12 +338,3 @@ def test_a_run_says_what_its_steps_leave_of_the_pressure(tmp_path) -> None:
             step = re.search(r"wear\.step: (\{.*\})\)$", warned[0])[1]
             assert "second_order" in step
     assert errors[1] < 0.6 * errors[0]
-
-
-def test_many_jumps_are_warned_of(tmp_path, monkeypatch) -> None:
-    """The warning appears once, with the setting that reduces the number of jumps."""
-    monkeypatch.setattr(recording, "MANY_JUMPS", 2)
-    warnings = worn_over_50_um(tmp_path / "run", "{kind: implicit, cycles: 4500}")[1]
-    (line,) = (line for line in warnings if "wear jumps" in line)
-    assert "about 2 more are needed" in line
-    assert "wear.step.cycles" in line

@@ -95,7 +95,7 @@ def test_planes_are_exact_on_nodes_and_cells(blocks):
         np.testing.assert_allclose(inside, gap(grid.x, grid.y), atol=1e-12)
 
 
-def test_what_the_nodes_do_not_follow_is_told(blocks):
+def test_the_part_of_a_scan_lost_by_nodes_is_reported(blocks):
     """Waves are a fifth of the face long, elements a half."""
     case = load_case(with_surfaces(blocks, body_1={"file": "waves.npy", **SCAN}))
     (face,) = case.scanned()

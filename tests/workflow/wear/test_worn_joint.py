@@ -1,13 +1,10 @@
 """Tests of a joint that follows the wear of its contact, computed before it."""
 
 import json
-from types import SimpleNamespace
 
 import pytest
 
 from tests.workflow.conftest import invoke
-from tests.workflow.scenes import BALL
-from workflow.analyses.time.worn_joint import warn_of_table
 from workflow.analyses.wear.output.loop_table import read_loop_table
 from workflow.case.fields import Quantity
 from workflow.case.files.table_file import read_table_file
@@ -89,31 +86,3 @@ def test_a_run_that_was_broken_off_takes_its_finished_wear(folder):
     assert "taken from the earlier run in" in ended.output
     assert wear.stat().st_mtime_ns == finished
     assert json.loads(summary.read_text())["states"] == first["states"]
-
-
-@pytest.mark.parametrize(
-    ("wear", "words"),
-    [
-        (BALL, "no case of wear with loops"),
-        (WEAR.replace("loops: {amplitude: 10 um}\n", ""), "writes no table of loops"),
-        (WEAR.replace("P: 50 N", "P: 50 mm"), "load_path.P"),
-    ],
-)
-def test_a_case_without_loops_is_refused(tmp_path, wear, words):
-    ended = run(tmp_path, wear)
-    assert ended.exit_code == 2
-    assert words in ended.output.replace("\n", " ")
-    assert not (tmp_path / "out" / "wear").exists()
-
-
-def test_a_table_of_loops_that_stick_is_warned_of(tmp_path):
-    """Their force over the load is less than the coefficient of friction."""
-    table = tmp_path / "loops.csv"
-    table.write_text("energy [J],P [N],kt [N/um],mu,sliding\n0,50,40,0.5,1\n5,50,50,0.2,0.4\n")
-    printed = []
-    case = SimpleNamespace(
-        evolution=SimpleNamespace(file=str(table)), joint=SimpleNamespace(normal_load=50.0)
-    )
-    warn_of_table(case, 5e3, SimpleNamespace(warn=printed.append))
-    (line,) = printed
-    assert "1 of its 2 loops do not slide as a whole" in line

@@ -21,7 +21,7 @@ AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 
 
 def model_with(case: WearCase, structure: Structure) -> WearModel:
-    """Return the model of a case with this structure: its contacts, how they wear and their stress."""
+    """Return the model of a case with this structure: contacts, wear and stress."""
     names = case.contact_names
     contacts: Contact | dict[str, Contact] = contact_of(case, names[0])
     if len(names) > 1:

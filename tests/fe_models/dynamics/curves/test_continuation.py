@@ -93,7 +93,7 @@ def start(equations, guess, parameter, upward=True, step=0.02):
     return first_point(solution, parameter, upward, step)
 
 
-def test_newton_ends_at_the_solution_or_says_so():
+def test_newton_ends_at_the_solution_or_reports_failure():
     solution = solve(S_CURVE, np.array([-3.0]), 1.0)
     assert solution.converged
     assert solution.unknowns[0] ** 3 - 3.0 * solution.unknowns[0] == pytest.approx(-4.0, abs=EXACT)
@@ -190,7 +190,7 @@ def test_a_narrow_peak_is_not_jumped_over():
     assert len(curve.points) < 150
 
 
-def test_a_curve_that_ends_says_where():
+def test_a_curve_reports_where_it_ends():
     """The equation has no solution beyond λ = 1."""
 
     def root(u, p):
@@ -242,7 +242,7 @@ def test_finer_equations_with_their_peak_elsewhere_do_not_turn_the_curve_round(p
 
 
 @pytest.mark.parametrize("end", [0.5, 9.5])
-def test_a_curve_that_leaves_by_the_wrong_end_says_so(end):
+def test_a_curve_that_leaves_by_the_wrong_end_is_reported(end):
     """The curve λ = 3 + u² falls to its fold at 3 and rises again."""
     parabola = scalar(lambda u, p: u * u + 3.0 - p, lambda u, p: 2.0 * u, lambda u, p: -1.0)
     first = start(parabola, 2.0, 7.0, upward=False)

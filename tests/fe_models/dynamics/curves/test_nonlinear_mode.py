@@ -166,13 +166,6 @@ def test_derivatives_of_the_equations():
     np.testing.assert_allclose(at.slope, (ends[0] - ends[1]) / 4e-8, atol=1e-4)
 
 
-@pytest.mark.parametrize("ends", [(0.0, 1.0), (2.0, 1.0)])
-def test_amplitudes_must_ascend(ends):
-    problem = oscillator()
-    with pytest.raises(HarmonicBalanceError, match="give two above 0 that ascend"):
-        along_nonlinear_mode(problem, LinearMode.of(problem, 1), ends)
-
-
 def test_unknown_modes_are_refused():
     with pytest.raises(HarmonicBalanceError, match="has 1 to 1"):
         LinearMode.of(oscillator(), 2)

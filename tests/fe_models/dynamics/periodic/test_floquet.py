@@ -307,7 +307,7 @@ def test_a_mass_on_a_stop_through_grazing():
 
 
 @pytest.mark.slow
-def test_a_period_doubles_where_time_integration_says_so():
+def test_a_period_doubles_where_time_integration_doubles_it():
     """Beyond a multiplier of -1 only every second period is the same.
 
     The static load removes the symmetry of the oscillator.

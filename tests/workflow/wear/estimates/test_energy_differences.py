@@ -60,13 +60,6 @@ def test_energies_of_a_file_that_the_half_space_contradicts(tmp_path):
         assert warnings_of(tmp_path, *scene) == []
 
 
-def test_energies_that_are_hardly_any_contradict_nothing(tmp_path):
-    """Rounding of a table causes no warning where everything sticks."""
-    case, source, stage, state, first = of_file(tmp_path, 1e-6)
-    nothing = replace(first, energy=0.0 * first.energy)
-    assert warnings_of(tmp_path, case, source, stage, state, nothing) == []
-
-
 @pytest.mark.parametrize(("share", "warned"), [(1.0, False), (0.5, False), (1.7e-4, True)])
 def test_nodes_that_dissipate_what_the_half_space_does_not(tmp_path, share, warned):
     """Method full wears by the half-space's energies: 0.006, where the nodes have 36."""

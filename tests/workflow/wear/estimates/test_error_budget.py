@@ -15,7 +15,7 @@ from fe_models.meshes.structure_mesh import MeshError
 from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import settings
 from workflow.analyses.wear import run
-from workflow.analyses.wear.approximations import probe_runs, registry
+from workflow.analyses.wear.approximations import probe_runs
 from workflow.analyses.wear.approximations.probe_runs import STEPS, Numbers, probe_run
 from workflow.analyses.wear.budget import finding, probe_cases
 from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_lowered
@@ -28,7 +28,6 @@ from workflow.analyses.wear.budget.report import (
 )
 from workflow.analyses.wear.checks import run_errors
 from workflow.analyses.wear.checks.run_errors import REMEDIES
-from workflow.analyses.wear.fidelity.choosing import SHARES
 from workflow.analyses.wear.output.layout import PARTS
 from workflow.analyses.wear.output.outcome import InterfaceOutcome, peak_change
 from workflow.analyses.wear.structures import structure_of
@@ -66,10 +65,6 @@ def test_a_peak_without_a_limit_is_found_by_its_cells() -> None:
     assert peak_lowered(in_plane) == pytest.approx(peak_lowered(means[:, None]), rel=1e-12)
 
 
-def test_nothing_pressed_has_no_peak() -> None:
-    assert peak_lowered(np.zeros((4, 3))) == 0.0
-
-
 # --- report ---------------------------------------------------------------------------------------
 
 ERROR = ResultError({"link": 0.004, "mesh": 0.03, "increments": None, "steps": 0.012})
@@ -78,17 +73,14 @@ ERROR = ResultError({"link": 0.004, "mesh": 0.03, "increments": None, "steps": 0
 def test_parts_add_up_and_unknown_ones_are_named() -> None:
     assert ERROR.total == pytest.approx(0.046)
     assert summary_of({"depth": ERROR})["depth"] == {**ERROR.parts, "total": ERROR.total}
-    lines = list(sentences({"depth": ERROR}))
-    assert lines == [
-        "estimated errors: depth 4.6 %",
-        "largest parts for depth: mesh 3.0 %, steps 1.2 %; unknown: increments",
-    ]
+    total, largest = sentences({"depth": ERROR})
+    assert "depth 4.6 %" in total
+    assert all(part in largest for part in ("mesh 3.0 %", "steps 1.2 %", "unknown: increments"))
     (written,) = arrays_of({"depth": ERROR}).values()
-    *by_part, total = written
-    known = {part: value for part, value in zip(PARTS, by_part, strict=True) if value == value}
-    left = {"link": 0.004, "mesh": 0.03, "steps": 0.012}
-    assert known == {"grid": 0.0, "coupling": 0.0, "solver": 0.0, **left}
-    assert total == ERROR.total
+    known = dict(zip([*PARTS, "total"], written, strict=True))
+    assert np.isnan(known.pop("increments"))
+    left = ERROR.parts | {"grid": 0.0, "coupling": 0.0, "solver": 0.0, "total": ERROR.total}
+    assert known == {name: value for name, value in left.items() if value is not None}
 
 
 def test_parts_of_opposite_sign_cancel_but_for_what_each_is_uncertain_by() -> None:
@@ -99,14 +91,6 @@ def test_parts_of_opposite_sign_cancel_but_for_what_each_is_uncertain_by() -> No
     off = np.random.default_rng(1).normal(1.0, UNCERTAIN, (2, 100_000))
     drawn = off[0] * parts["mesh"] + off[1] * parts["increments"]
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.hypot(0.01, 0.025), rel=0.02)
-    assert list(sentences({"volume": error})) == [
-        "estimated errors: volume 2.7 %",
-        "largest parts for volume: mesh +4.0 %, increments -3.0 %",
-    ]
-
-
-def test_one_sign_is_the_sum_of_sizes() -> None:
-    assert ResultError({"grid": 0.02, "steps": 0.03}).total == pytest.approx(0.05, rel=1e-12)
 
 
 def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> None:
@@ -117,13 +101,6 @@ def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> N
     assert "depth 4.6 %" in line
     assert "worn peak" not in line  # edges may be farther off
     assert REMEDIES["mesh"] in line
-
-
-def test_every_part_of_the_budget_is_an_approximation() -> None:
-    """The registry names all parts and all settings that ``fidelity: auto`` decides."""
-    assert {*registry.PARTS} == {*PARTS}
-    decided = {known.name for known in registry.APPROXIMATIONS if known.decide is not None}
-    assert decided == {"dimension", *SHARES}
 
 
 def probe_cases_of(case) -> ProbeCases:
@@ -307,11 +284,6 @@ def test_a_joint_in_space_is_judged_by_its_section() -> None:
     assert not cases.same
     assert cases.own.structure.dimension == neighbour(cases, "mesh").structure.dimension == 2
     assert cases.own.mesh == case.mesh
-
-
-def test_half_spaces_are_compared_with_linked_ones(section) -> None:
-    case = changed(section, {"contact.link": "half_space"})
-    assert neighbour(probe_cases_of(case), "link").contact.link == "corrected"
 
 
 def test_a_probe_run_that_fails_leaves_its_own_part_unknown(section, monkeypatch) -> None:

@@ -40,7 +40,7 @@ def test_only_bodies_with_curved_edges_have_midsides(tmp_path):
     np.testing.assert_allclose(radii, 30.0, rtol=1e-6)
 
 
-def test_edges_that_are_taken_straight_are_doubted(tmp_path):
+def test_edges_that_are_taken_straight_give_a_warning(tmp_path):
     case = load_case(pressed(tmp_path, 2, 2))
     assert isinstance(case, MeshCase)
     imported, mesh = case.structure.read(None), case.structure.mesh(None, 2)

@@ -172,7 +172,7 @@ def test_hertz_of_a_mesh_that_is_coarser_than_the_contact(tmp_path, dimension: i
 
 
 @pytest.mark.slow
-def test_vertices_that_are_off_their_surface_are_told(tmp_path):
+def test_vertices_that_are_off_their_surface_give_a_warning(tmp_path):
     """The reported effect on the peak pressure is at least the actual one."""
     case = pressed(tmp_path, 2, 1)
     with gmsh_model("moved") as gmsh:
@@ -192,7 +192,7 @@ def test_vertices_that_are_off_their_surface_are_told(tmp_path):
     assert 0.02 < true < share < 10.0 * true
 
 
-def test_a_check_says_how_a_face_is_curved(tmp_path):
+def test_check_reports_the_curvature_of_a_face(tmp_path):
     """Outer facets are 2 mm long, and their chords deviate from the circle by 17 µm."""
     case = pressed(tmp_path, 2, 1)
     printed = invoke("check", case).output

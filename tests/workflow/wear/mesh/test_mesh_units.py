@@ -10,7 +10,7 @@ from tests.fe_models.readers import cae_files
 from tests.fe_models.readers.test_cae_files import group
 from tests.workflow.case.test_offered_case import deck, offered
 from tests.workflow.command_line import invoke
-from tests.workflow.mesh_scenes import refused, run, write_case
+from tests.workflow.mesh_scenes import run, write_case
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 METRES = "structure.length_unit=m"
@@ -56,7 +56,7 @@ def _printed(case, *options):
     return " ".join(invoke("check", case, *options).output.split())
 
 
-def test_a_forgotten_unit_is_doubted(blocks, tmp_path):
+def test_a_forgotten_unit_gives_a_warning(blocks, tmp_path):
     """Metres read as mm make bodies of µm, with 4 N on a millionth of their face."""
     assert "warning: " not in _printed(blocks)
     divided(tmp_path / "blocks.inp", 1000.0)
@@ -72,7 +72,7 @@ def test_a_forgotten_unit_is_doubted(blocks, tmp_path):
     assert "structure.loads.1.displacement: moves Foot-1, which is 1 mm long, by 0.8 mm" in printed
 
 
-def test_what_a_file_in_inches_says_is_offered_in_our_units(tmp_path):
+def test_a_file_in_inches_becomes_a_case_in_base_units(tmp_path):
     """Pounds, inches and seconds: 3e7 psi, 7.346e-4 lbf s²/in⁴, 5801.5 psi, a traction of 4."""
     path = deck(tmp_path)
     divided(path, 25.4)
@@ -127,13 +127,3 @@ def test_metres_of_a_universal_file_are_asked_about(tmp_path):
         printed = _printed(case, "--set", f"structure.length_unit={unit}")
         assert "warning: structure.length_unit" not in printed
         assert f"bodies within {sides}" in printed
-
-
-def test_files_that_are_not_read_are_refused_with_what_to_export(blocks, tmp_path):
-    """They are not listed among the allowed formats either."""
-    for name in ("a.odb", "a.geo", "a.xyz"):
-        (tmp_path / name).write_text("", encoding="utf-8")
-        wrong, _, allowed = refused(blocks, f"structure.file={name}").partition("; allowed: ")
-        assert re.search(r"export it as|mesh it with gmsh", wrong)
-        assert ".e" in allowed
-        assert ".odb" not in allowed

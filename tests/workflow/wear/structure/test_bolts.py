@@ -111,7 +111,7 @@ def test_wear_of_what_is_clamped_costs_tension(clamp, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_bolt_is_told_in_check_summary_and_report(clamp, tmp_path):
+def test_a_bolt_is_in_check_summary_and_report(clamp, tmp_path):
     checked = invoke("check", clamp)
     assert checked.exit_code == 0, checked.stderr
     assert "pretension, force 600 N of frame" in checked.stdout

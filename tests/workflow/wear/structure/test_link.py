@@ -21,7 +21,7 @@ from workflow.shell.terminal.reporter import Reporter
 PLACES = np.array([-3.0, 0.0, 3.0])
 
 
-def test_a_run_says_how_its_contacts_are_linked(whole) -> None:
+def test_a_run_reports_how_its_contacts_are_linked(whole) -> None:
     summary = json.loads((whole.folder / "summary.json").read_text())
     log = (whole.folder / "run.log").read_text()
     for name in ("intrados", "extrados"):

@@ -103,7 +103,7 @@ def test_section_is_that_of_the_recorded_tractions_and_of_the_structure(request,
                 assert "past it" in section["stress"].attrs["description"]
 
 
-def test_summary_tells_the_largest_of_the_maps(normal: Any) -> None:
+def test_summary_has_the_largest_values_of_the_maps(normal: Any) -> None:
     with h5py.File(normal.folder / "results.h5") as file:
         for flank in FLANKS:
             grid, reported = grid_of(file["grid"][flank]), normal.summary[flank]["stress"]
