@@ -73,14 +73,13 @@ def complex_array(
     shape: Shape | None,
     *,
     error: type[FretscaleError] = InputError,
-    finite: bool = True,
 ) -> NDArray[Any]:
     """Return ``values``, real or complex, as an array of ``shape``; what :func:`array` refuses."""
     plain = _without_mask(name, values, None, error)
     if plain.dtype.kind != "c":
-        return array(name, plain, shape, error=error, finite=finite, order="K")
+        return array(name, plain, shape, error=error, order="K")
     for part in (plain.real, plain.imag):
-        array(name, part, shape, error=error, finite=finite)
+        array(name, part, shape, error=error)
     return np.asarray(plain, dtype=np.complex128)
 
 

@@ -113,13 +113,12 @@ def rms(heights: Array) -> float:
 # --- level, and missing points ------------------------------------------------------------------
 
 
-def fit(scan: Scan, level: Level, where: Mask | None = None) -> Array:
+def fit(scan: Scan, level: Level) -> Array:
     """Return the surface of ``level``, fitted by least squares, at all points ``(nx, ny)`` [mm].
 
-    Measured points are used; ``where`` restricts them further. Raises InputError for fewer points
-    than twice the number of terms.
+    Raises InputError for fewer measured points than twice the number of terms.
     """
-    (nx, ny), points = scan.heights.shape, scan.measured if where is None else where & scan.measured
+    (nx, ny), points = scan.heights.shape, scan.measured
     terms = [(i, j) for i, j in TERMS[level] if (nx > 1 or i == 0) and (ny > 1 or j == 0)]
     if not terms:
         return np.zeros((nx, ny))

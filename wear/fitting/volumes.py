@@ -191,14 +191,12 @@ def volume_problem(data: Sequence[VolumeData], law: VolumeLaw) -> VolumeFit:
         _check(one, law)
     require_distinct_names([one.name for one in data])
     names: dict[tuple[str, str], int] = {}
-    unknowns: list[FreeParameter] = []
+    unknowns: dict[str, FreeParameter] = {}
     for one in data:
         for name, unknown in _unknowns(one, law):
-            if name != EXPONENT or (data[0].name, EXPONENT) not in names:
-                unknowns.append(unknown)
-                names[one.name, name] = len(unknowns) - 1
-            else:
-                names[one.name, name] = names[data[0].name, EXPONENT]
+            # The exponent has one name for all bodies.
+            unknowns.setdefault(unknown.name, unknown)
+            names[one.name, name] = list(unknowns).index(unknown.name)
     series = tuple(Series(one.name, one.volume, one.deviations) for one in data)
 
     def predict(values: Array) -> Array:
@@ -208,7 +206,7 @@ def volume_problem(data: Sequence[VolumeData], law: VolumeLaw) -> VolumeFit:
         return np.concatenate(volumes)
 
     starts = _starts(data, law, names)
-    problem = FitProblem(tuple(unknowns), series, predict, starts)
+    problem = FitProblem(tuple(unknowns.values()), series, predict, starts)
     return VolumeFit(problem, tuple(data), law, names)
 
 

@@ -28,6 +28,7 @@ from fe_models.dynamics.curves.bordered import solve_alone
 from fe_models.dynamics.curves.continuation import follow
 from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, first_point
 from fe_models.dynamics.curves.newton import NewtonControl, solve
+from fe_models.dynamics.curves.sizes import limited_frequency
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError
@@ -39,8 +40,8 @@ from sa_solver.types import Array
 # Relative offset of the initial frequency from that of the linear mode. With joints of no
 # stiffness, that frequency is one of the structure alone, whose flexibility is not finite there.
 INITIAL_OFFSET = 1e-4
-# Largest ratio of a frequency to that of the linear mode, and largest damping ratio.
-MAX_FREQUENCY_RATIO, MAX_DAMPING_RATIO = 1e3, 10.0
+# Largest damping ratio.
+MAX_DAMPING_RATIO = 10.0
 
 
 @dataclass(frozen=True)
@@ -215,10 +216,7 @@ class NonlinearMode:
 
     def frequency_of(self, unknowns: Array) -> float:
         """Return the frequency [Hz] that the unknowns stand for."""
-        share = np.clip(
-            unknowns[-2] / self.scale, -np.log(MAX_FREQUENCY_RATIO), np.log(MAX_FREQUENCY_RATIO)
-        )
-        return float(self.frequency * np.exp(share))
+        return limited_frequency(self.frequency, unknowns[-2] / self.scale)
 
     def damping_ratio_of(self, unknowns: Array) -> float:
         """Return the damping ratio D that the unknowns stand for."""

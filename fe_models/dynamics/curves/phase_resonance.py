@@ -30,6 +30,7 @@ from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import FollowedCurve
 from fe_models.dynamics.curves.forced_response import Motions, ResponseBranch
 from fe_models.dynamics.curves.motion_recorder import Accuracy, MotionRecorder
+from fe_models.dynamics.curves.sizes import limited_frequency
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError
@@ -38,9 +39,6 @@ from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
-# Largest ratio of a frequency to that of the start. If Newton's method goes farther it is lost, and
-# must not overflow.
-MAX_FREQUENCY_RATIO = 1e3
 # Tolerance for the points of a force to act in phase or in antiphase.
 SAME_PHASE = 1e-9
 
@@ -237,7 +235,7 @@ def along_phase_resonance(
     if isinstance(first, str):
         message = (
             f"no phase resonance is found under {nearest.force:g} N from {nearest.frequency:.6g} "
-            f"Hz, so start from a motion nearer to the peak of the response; {first}"
+            f"Hz: {first}, such as one nearer to the peak of the response"
         )
         return Backbone((), message, problem)
     halves, messages = [], []
@@ -323,10 +321,7 @@ class PhaseResonance:
 
     def frequency_of(self, unknowns: Array) -> float:
         """Return the frequency [Hz] that the unknowns stand for."""
-        share = np.clip(
-            unknowns[-1] / self.scale, -np.log(MAX_FREQUENCY_RATIO), np.log(MAX_FREQUENCY_RATIO)
-        )
-        return float(self.frequency * np.exp(share))
+        return limited_frequency(self.frequency, unknowns[-1] / self.scale)
 
     def unknown_of(self, frequency: float) -> float:
         """Return the unknown that stands for a frequency [Hz]."""

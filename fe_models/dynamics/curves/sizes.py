@@ -1,4 +1,4 @@
-"""Norms of small arrays of unknowns and residuals."""
+"""Norms of small arrays of unknowns and residuals, and frequencies as unknowns."""
 
 from __future__ import annotations
 
@@ -7,6 +7,10 @@ from math import isfinite, sqrt
 import numpy as np
 
 from sa_solver.types import Array
+
+# Largest ratio of a frequency to its reference. If Newton's method goes farther it is lost, and
+# must not overflow.
+MAX_FREQUENCY_RATIO = 1e3
 
 
 def norm(values: Array) -> float:
@@ -20,3 +24,9 @@ def relative_norm(residual: Array, size: float) -> float:
     if not isfinite(residual_norm):
         return np.inf
     return residual_norm / size if residual_norm > 0.0 else 0.0
+
+
+def limited_frequency(reference: float, exponent: float) -> float:
+    """Return a frequency exp(exponent) times its reference, up to :data:`MAX_FREQUENCY_RATIO`."""
+    limit = np.log(MAX_FREQUENCY_RATIO)
+    return float(reference * np.exp(np.clip(exponent, -limit, limit)))
