@@ -26,6 +26,7 @@ from workflow.models.stress.contact_stress import (
     InterfaceStress,
     life_maps,
 )
+from workflow.models.stress.results import StressResults
 from workflow.models.stress.settings import Stress
 from workflow.shell.output.results import grid_of
 
@@ -282,6 +283,16 @@ def test_what_is_not_known_of_the_structure_is_warned_of(fits: list[float], repo
     _report_carried(stress, received)
     assert len(received.printed) == bool(reported)
     assert all(reported in line for line in received.printed)
+
+
+@pytest.mark.parametrize(("stuck", "words"), [(0.0, ""), (0.3, "sticks")])
+def test_a_model_names_shear_that_nobody_knows(stuck: float, words: str) -> None:
+    planes = Planes(Stress(), Grid.covering((2.0, 2.0), (4, 4)))
+    stress = InterfaceStress("a", planes, {}, np.array([0.0, stuck]), 0)
+    for peak in (0, 1):
+        faults = list(StressResults(None, [stress]).faults(peak))
+        assert len(faults) == bool(words)
+        assert all(words in fault for fault in faults)
 
 
 # --- settings -----------------------------------------------------------------------------------
