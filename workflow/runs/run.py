@@ -30,6 +30,7 @@ from workflow.shell.processes import WorkerProcess
 from workflow.shell.run_time import RunTime
 from workflow.shell.terminal.reporter import FORECAST, SHORT_RUN, TERMINAL, Reporter, telling
 from workflow.shell.terminal.screen import Loudness, Screen
+from workflow.shell.terminal.signals import remembering_interruptions
 
 # Seconds after which an interrupted process, and the process that started it, have surely ended.
 PATIENCE = 60.0
@@ -139,7 +140,7 @@ def _working(
     messages say how to resume.
     """
     try:
-        with locked(out, patience, take_over) as gone:
+        with remembering_interruptions(), locked(out, patience, take_over) as gone:
             yield gone
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(_stopped(analysis_of(case), OutputFolder(out))) from stop

@@ -5,6 +5,8 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,9 @@ import pytest
 from fe_models import interpreter
 from tests.workflow.command_line import AS_PROCESS
 from tests.workflow.shell.interruptions import PATIENCE, posix_only
+from workflow.shell.terminal.reporter import Reporter
+from workflow.shell.terminal.screen import Loudness
+from workflow.shell.terminal.signals import remembering_interruptions
 
 # Many quick jumps, so that a random moment mostly falls among them.
 MANY = (*("wear.step.cycles=1500", "coupling.drift=2e-4"), "load_path.increments=[5, 7]")
@@ -131,3 +136,22 @@ def test_workers_end_with_a_run_that_is_killed(small_path, tmp_path):
     process, below = begun(small_path, tmp_path / "out")
     process.kill()
     assert wait_until(lambda: not any(map(alive, below)), PATIENCE)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_ctrl_c_that_a_library_loses_ends_the_run_at_its_next_stage(tmp_path):
+    class Held:
+        """Object whose end runs a callback, in which Python loses exceptions."""
+
+    held = Held()
+    watch = weakref.ref(held, lambda _: signal.raise_signal(signal.SIGINT))
+    before = signal.getsignal(signal.SIGINT)
+    reporter = Reporter(tmp_path / "run.log", loudness=Loudness.QUIET)
+    with closing(reporter), remembering_interruptions():
+        del held
+        assert watch() is None
+        with pytest.raises(KeyboardInterrupt), reporter.stage("next"):
+            pass
+        with reporter.stage("cleaning up"):
+            pass
+    assert signal.getsignal(signal.SIGINT) is before

@@ -16,6 +16,7 @@ from workflow.shell.folders.store import check_regular
 from workflow.shell.forecast import Forecast, about
 from workflow.shell.run_time import RunTime
 from workflow.shell.terminal.screen import Loudness, ProgressRow, Screen, console
+from workflow.shell.terminal.signals import end_if_interrupted
 
 T = TypeVar("T")
 NOTHING_EXPECTED = RunTime(after=0.0)
@@ -60,7 +61,8 @@ class _Stage:
         self._printed, self._isolated = self._looked, isolated
 
     def __call__(self, done: int, total: int) -> None:
-        """Show that ``done`` of ``total`` are done."""
+        """Show that ``done`` of ``total`` are done. Raises KeyboardInterrupt if one was lost."""
+        end_if_interrupted()
         with self._isolated(FORECAST):
             self._look(done, total)
 
@@ -146,7 +148,9 @@ class Reporter:
         """Show and time a stage; times of stages with the same name are added.
 
         The yielded callback takes the number of finished items, named by ``of``, and the total.
+        Raises KeyboardInterrupt if one was lost.
         """
+        end_if_interrupted()
         begin = time.perf_counter()
         try:
             with self._screen.row(name) as row:
