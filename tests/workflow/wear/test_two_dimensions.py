@@ -19,7 +19,7 @@ from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.checks.uniformity import Uniformity, sections, uniformities
 from workflow.analyses.wear.fidelity import choosing
 from workflow.analyses.wear.fidelity.decisions import choose_dimension
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.text.readable import percent
 from workflow.case.text.writing import dump_case
@@ -203,7 +203,7 @@ def slot(small_path):
     case = load_case(
         small_path, ["mesh.flank_nodes=[6, 8]", "mesh.size=12", "contact.grid=[24, 48]"]
     )
-    source = structure_of(case).source(case)
+    source = loads_of(case)
     stages = [face_contact(case, face) for face in source.faces]
     return source, [
         (stage, stage.contact.begin(history, case.wear.cycles)[0])
@@ -251,7 +251,7 @@ def test_what_has_worn_unevenly_is_not_uniform(slot):
 
 def test_a_section_or_a_file_has_no_uniformity(plane_path):
     case = load_case(plane_path, ["mesh.flank_nodes=[6, 8]"])
-    source = structure_of(case).source(case)
+    source = loads_of(case)
     assert source.line
     assert uniformities(source, []) == {}
 
@@ -371,7 +371,7 @@ def test_run_in_space_says_how_uniform_it_is(whole):
 def in_the_middle(run: Run, name: str) -> dict[str, float]:
     """Return P, Qx at peak load, mean slip and energy of a cycle, and worn depth, in mid-slot."""
     case = load_case(run.folder / "case.yaml")
-    source = structure_of(case).source(case)
+    source = loads_of(case)
     faces = {face.face.name: number for number, face in enumerate(source.faces)}
     stage = face_contact(case, source.faces[faces[name]])
     unworn, friction = source.unworn()[faces[name]], case.friction.at(0.0)

@@ -8,7 +8,9 @@ from workflow.analyses.wear.translation import contact_of, wear_of
 from workflow.case.sections import Case
 from workflow.errors import UserError
 from workflow.models.contact import Contact
+from workflow.models.loads import LoadSource
 from workflow.models.wear import WearModel
+from workflow.shell.folders.cache import DiskStore
 
 
 def wear_model(case: Case) -> WearModel:
@@ -26,3 +28,8 @@ def wear_model(case: Case) -> WearModel:
     if len(names) > 1:
         contacts = {name: contact_of(case, name) for name in names}
     return WearModel(structure_of(case).model(case), contacts, wear_of(case))
+
+
+def loads_of(case: WearCase) -> LoadSource:
+    """Return the loads of the contacts of a case; condensed parts are in the user's cache."""
+    return wear_model(case).loads(DiskStore())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import prod
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from workflow.analyses.wear.approximations.approximation import Neighbour
 from workflow.analyses.wear.case.base import WearCase
@@ -78,13 +78,3 @@ class WearStructure(Generic[AnyWearCase]):
     finer: Callable[[AnyWearCase], Neighbour | None] = lambda _: None
     finer_cycles: Callable[[AnyWearCase, InterfaceState], list[CycleTractions] | None] = no_cycles
     settings: Callable[[AnyWearCase], Mapping[str, str]] = lambda _: {}
-
-    def source(self, case: AnyWearCase) -> LoadSource:
-        """Return the loads of the contacts of a case."""
-        model = self.model(case)
-        if not hasattr(model, "meshed"):
-            return model
-        # Finite elements take a second to import, so they are imported only where they are used.
-        from workflow.analyses.wear.translation import structure_loads
-
-        return structure_loads(case, lambda _: cast("StructureModel", model))

@@ -16,13 +16,13 @@ from tests.conftest import CASES
 from wear.cracking.bulk_stress import SIDE
 from wear.cracking.life import ruiz, smith_watson_topper
 from workflow.analyses.wear.case.sections import ContactStress
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.stress.body_stress import (
     Planes,
     StressedBody,
     StressedCycle,
     with_known_shear,
 )
-from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case
 from workflow.models.contact import FaceContact
@@ -52,7 +52,7 @@ class Flank:
     @classmethod
     def of(cls, *overrides: str) -> "Flank":
         case = load_case(PLANE, overrides)
-        source = structure_of(case).source(case)
+        source = loads_of(case)
         assert isinstance(source, StructureLoads)
         states = {"unworn": (source.mesh, source.unworn_cycle)}
         stress = source.stresses(states)["unworn"]
