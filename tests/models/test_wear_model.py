@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 import xarray
 
-from sa_solver import InputError
+from sa_solver import InputError, Material
 from tests.conftest import CASES
+from wear import EnergyLaw
+from wear.evolution import CoulombFriction, EnergyTable
 from workflow.analyses.wear.model import wear_model
 
 ROOT = CASES.parent
@@ -228,6 +230,25 @@ def test_errors_of_the_steps_are_near_the_true_ones():
 def test_cases_without_a_model_are_refused():
     with pytest.raises(fretscale.UserError, match="only the wear of contacts"):
         fretscale.wear_model(CASES / "sphere_normal.yaml")
+
+
+def test_nodes_that_wear_need_no_other_loads():
+    """Every step solves the structure, so that its loads are never followed as well."""
+    joint = script("dovetail_joint").model.structure
+    plane = replace(joint, dimension=2, mesh=fretscale.DovetailMesh((10, 10), 8.0))
+    titanium, law = Material(115e3, 0.29), EnergyLaw(1e-8)
+    contact = fretscale.Contact(
+        (24, 1), (titanium, titanium), (law, law), friction=0.4, method="nodes"
+    )
+    wear = fretscale.Wear(1e4, drift=1e-9)
+    results = fretscale.WearModel(plane, contact, wear).run()
+    assert results.attrs["solutions_of_the_loads"] == 1
+    volume, energy = (results["intrados"][name].values[-1] for name in ("volume_1", "energy"))
+    assert volume == pytest.approx(1e-8 * energy, rel=1e-12)
+    evolving = CoulombFriction(0.4, EnergyTable((0.0, 1.0), (1.0, 2.0)))
+    changing = fretscale.WearModel(plane, replace(contact, friction=evolving), wear)
+    with pytest.raises(InputError, match="friction that does not evolve"):
+        changing.run()
 
 
 def test_contacts_are_found_by_name(model):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -225,17 +225,7 @@ class FaceSolution(Protocol):
         ...
 
 
-if TYPE_CHECKING:
-    from typing_extensions import TypeVar
-
-    Solution = TypeVar("Solution", bound=FaceSolution, default=Any)
-else:
-    from typing import TypeVar
-
-    Solution = TypeVar("Solution", bound=FaceSolution)
-
-
-class FaceContact(Generic[Solution]):
+class FaceContact:
     """One contact face on its grid.
 
     Parameters
@@ -248,7 +238,7 @@ class FaceContact(Generic[Solution]):
         Wear settings.
     solution : callable
         Returns what solves the cycles of the face, from its settings: a class such as
-        :class:`wear.contact.interface.InterfaceContact`. Attribute ``contact`` has it.
+        :class:`wear.contact.interface.InterfaceContact`. It is the attribute ``contact``.
     stepper : Stepper, optional
         Stepper to use instead of that of ``wear``.
     """
@@ -258,7 +248,7 @@ class FaceContact(Generic[Solution]):
         face: ContactFace,
         contact: Contact,
         wear: Wear,
-        solution: Callable[[InterfaceSettings], Solution],
+        solution: Callable[[InterfaceSettings], FaceSolution],
         stepper: WearStepper | None = None,
     ) -> None:
         self._contact_face, self.face, self.name = face, face.face, face.face.name
@@ -281,7 +271,8 @@ class FaceContact(Generic[Solution]):
             link=contact.link,
             tolerance=contact.tolerance,
         )
-        self.contact = solution(self.settings)
+        # Typed as any: some callers need more than the protocol, what only half-spaces have.
+        self.contact: Any = solution(self.settings)
 
     def coarse_pressure(self, loads: LoadHistory, link: StructureLink, peak: int) -> Array:
         """Return the unworn peak pressure [MPa] on a grid as coarse as the structure's mesh."""

@@ -37,9 +37,7 @@ class FaceContacts:
     views: Callable[[Sequence[Any]], Sequence[FaceState]] = list
 
     @classmethod
-    def half_spaces(
-        cls, stages: Sequence[FaceContact[InterfaceContact]], call: Call | None = None
-    ) -> FaceContacts:
+    def half_spaces(cls, stages: Sequence[FaceContact], call: Call | None = None) -> FaceContacts:
         """Return half-space contacts, called one after the other in this process by default."""
         contacts = [stage.contact for stage in stages]
         call = call or partial(call_in_turn, contacts)

@@ -17,6 +17,7 @@ import numpy as np
 
 from fe_models.meshes.cut_face import whole_values
 from fe_models.structure import CycleSolution, InterfaceHistory
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.contact.contacts import call_in_turn, kinetics_of
 from wear.contact.face_loads import FaceLoads
@@ -222,7 +223,7 @@ class NodalContacts:
     def jump(
         self, states: Sequence[NodalState], cycles: float, left: float
     ) -> list[tuple[NodalState, Cost]]:
-        (state,) = states
+        state = _of_all_nodes(states)
         begun = self._cycles.at(state.surfaces.depth)
 
         def contact_at(worn: NodalState) -> NodalContact:
@@ -239,18 +240,24 @@ class NodalContacts:
         return np.array([kinetics_of(state, face.volume) for face, state in pairs])
 
     def nodal_depths(self, states: Sequence[NodalState]) -> list[Array]:
-        (state,) = states
-        return self._cycles.split(state.surfaces.depth)
+        return self._cycles.split(_of_all_nodes(states).surfaces.depth)
 
     def views(self, states: Sequence[NodalState]) -> list[NodalFaceState]:
         """Return the state of every face."""
-        (state,) = states
+        state = _of_all_nodes(states)
         return [face.view(state) for face in self._faces]
 
     def _contact(self, solution: CycleSolution) -> NodalContact:
         histories = self._cycles.on_faces(solution)
         cycle = StructureCycle(histories, self._friction, self._areas, self._stiffness)
         return NodalContact(self._laws, (cycle,))
+
+
+def _of_all_nodes(states: Sequence[NodalState]) -> NodalState:
+    """Return the only state. Raises InputError for those of faces, which older versions stored."""
+    if len(states) != 1:
+        raise InputError("the stored state is of an older version: start the run again")
+    return states[0]
 
 
 def nodal_contacts(contact: ContactOf, wear: Wear, source: StructureLoads) -> FaceContacts:

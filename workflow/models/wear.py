@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -100,18 +100,19 @@ class WearModel:
     def face_contacts(self, loads: LoadSource) -> FaceContacts:
         """Return the contacts of all faces, which wear in this process."""
         faces = loads.faces
-        methods = {self.contact(face.face.name).method for face in faces}
+        contacts = [self.contact(face.face.name) for face in faces]
+        methods = {contact.method for contact in contacts}
         if methods == {"nodes"}:
             if not isinstance(loads, StructureLoads):
                 raise InputError("method nodes needs a structure of finite elements")
+            if _evolves(contacts):
+                raise InputError("method nodes needs friction that does not evolve")
             return nodal_contacts(self.contact, self.wear, loads)
         if "nodes" in methods:
             raise InputError("method nodes is for all contacts of a model or for none")
+        pairs = zip(faces, contacts, strict=True)
         return FaceContacts.half_spaces(
-            [
-                FaceContact(face, self.contact(face.face.name), self.wear, InterfaceContact)
-                for face in faces
-            ]
+            [FaceContact(face, contact, self.wear, InterfaceContact) for face, contact in pairs]
         )
 
     def loop(
@@ -122,9 +123,12 @@ class WearModel:
 
     def settings(self, loads: LoadSource) -> CoupledSettings:
         """Return the length of the coupled loop, and when it updates the loads."""
-        names = (face.face.name for face in loads.faces)
-        evolves = any(self.contact(name).coulomb.evolution is not None for name in names)
-        return self.wear.coupled("evolving" if evolves else "constant")
+        contacts = [self.contact(face.face.name) for face in loads.faces]
+        settings = self.wear.coupled("evolving" if _evolves(contacts) else "constant")
+        if contacts[0].method == "nodes":
+            # There the whole structure is solved in every step.
+            return replace(settings, resultants="constant")
+        return settings
 
     def run(
         self,
@@ -213,6 +217,11 @@ class WearModel:
             tractions = contact.unworn_tractions(begin, found), contact.tractions(state)
             cycles.append(cycles_of(face, number, tractions, begin, structure))
         return StressResults(structure, contact_stresses(stress, loads.peak, cycles))
+
+
+def _evolves(contacts: Sequence[Contact]) -> bool:
+    """Return whether the friction of any contact changes as it dissipates energy."""
+    return any(contact.coulomb.evolution is not None for contact in contacts)
 
 
 def _warnings(

@@ -8,7 +8,7 @@ import pytest
 from sa_solver.types import LoadHistory
 from tests.workflow.command_line import command
 from tests.workflow.conftest import Run
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
 from workflow.analyses.wear.structures.resultants.writing import (
@@ -43,7 +43,7 @@ def staged(plane_path):
 
     def make(*overrides: str) -> StructureLoads:
         case = load_case(plane_path, [*COARSE, *SHORT, *overrides])
-        source = structure_of(case).source(case)
+        source = loads_of(case)
         assert isinstance(source, StructureLoads)
         return source
 

@@ -13,7 +13,7 @@ from wear.contact.nodes import NodalState
 from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState
 from wear.steps.step_errors import step_errors
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.translation import contact_of, wear_of
 from workflow.errors import CaseError
 from workflow.kinds import load_case
@@ -43,7 +43,7 @@ class Wearing:
     @classmethod
     def of(cls, *overrides: str) -> "Wearing":
         case = load_case(PLANE, (*NODES, *overrides))
-        source = structure_of(case).source(case)
+        source = loads_of(case)
         assert isinstance(source, StructureLoads)
         wear = wear_of(case)
         contacts = nodal_contacts(partial(contact_of, case), wear, source)

@@ -13,7 +13,7 @@ from sa_solver.reference.hertz import HertzCylinder
 from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import pressed_blocks, refused, run
 from tests.workflow.wear.mesh.plane_blocks import RADIUS, Blocks, solved
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.kinds import load_case
 
@@ -212,7 +212,7 @@ def test_loads_from_a_file_take_them_too(tmp_path):
     with (tmp_path / "case.yaml").open("w", encoding="utf-8") as stream:
         YAML().dump(case, stream)
     loaded = load_case(tmp_path / "case.yaml")
-    (face,) = structure_of(loaded).source(loaded).faces
+    (face,) = loads_of(loaded).faces
     grid = face.grid((32, 32))
     # Points of a pitch of 1/30, taken for means, are 1/30² / 24 R below them along each axis.
     exact = (grid.x**2 + grid.y**2) / 200.0

@@ -8,7 +8,7 @@ from sa_solver.surfaces.shapes import rounded_edge
 from tests.conftest import CASES
 from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import settings
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case
@@ -21,7 +21,7 @@ FLANKS = {"intrados": 1, "extrados": -1}
 def solved(path, *changes):
     """Return loads of both flanks, and the first cycle of their contacts."""
     case = load_case(path, list(changes))
-    source = structure_of(case).source(case)
+    source = loads_of(case)
     pairs = zip(source.unworn(), source.faces, strict=True)
     return [
         (history.loads, face_contact(case, face).contact.begin(history, 1.0)[1])

@@ -20,7 +20,7 @@ from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.checks.uniformity import Uniformity, sections, uniformities
 from workflow.analyses.wear.fidelity import choosing
 from workflow.analyses.wear.fidelity.decisions import choose_dimension
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.text.readable import percent
 from workflow.case.text.writing import dump_case
@@ -202,7 +202,7 @@ def slot(small_path):
     case = load_case(
         small_path, ["mesh.flank_nodes=[6, 8]", "mesh.size=12", "contact.grid=[24, 48]"]
     )
-    source = structure_of(case).source(case)
+    source = loads_of(case)
     stages = [face_contact(case, face) for face in source.faces]
     return source, [
         (stage, stage.contact.begin(history, case.wear.cycles)[0])
@@ -340,7 +340,7 @@ def test_a_run_in_space_reports_its_uniformity(whole):
 def in_the_middle(run: Run, name: str) -> dict[str, float]:
     """Return P, Qx at peak load, mean slip and energy of a cycle, and worn depth, in mid-slot."""
     case = load_case(run.folder / "case.yaml")
-    source = structure_of(case).source(case)
+    source = loads_of(case)
     faces = {face.face.name: number for number, face in enumerate(source.faces)}
     stage = face_contact(case, source.faces[faces[name]])
     unworn, friction = source.unworn()[faces[name]], case.friction.at(0.0)

@@ -7,6 +7,7 @@ from pathlib import Path
 from fe_models.meshes.structure_mesh import MeshError
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.figures.faces import write_faces
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.structures import structure_of
 from workflow.errors import UserError
 from workflow.models.structure import StructureLoads
@@ -22,7 +23,7 @@ def draw_faces(case: WearCase, name: str, out: Path, force: bool) -> Path:
     ``name`` is the name of the case in messages. Raises UserError where there is no mesh.
     """
     structure = structure_of(case)
-    source = structure.source(case)
+    source = loads_of(case)
     if not isinstance(source, StructureLoads):
         raise UserError(
             f"{name}: structure.kind: {structure.name} has no meshed faces to draw; allowed with "

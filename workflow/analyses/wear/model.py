@@ -7,7 +7,9 @@ from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import model_with
 from workflow.case.sections import Case
 from workflow.errors import UserError
+from workflow.models.loads import LoadSource
 from workflow.models.wear import WearModel
+from workflow.shell.folders.cache import DiskStore
 
 
 def wear_model(case: Case) -> WearModel:
@@ -21,3 +23,8 @@ def wear_model(case: Case) -> WearModel:
             "dovetail, a mesh, resultants or bodies"
         )
     return model_with(case, structure_of(case).model(case))
+
+
+def loads_of(case: WearCase) -> LoadSource:
+    """Return the loads of the contacts of a case; condensed parts are in the user's cache."""
+    return wear_model(case).loads(DiskStore())

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from wear.contact.interface import InterfaceState
     from wear.contact.tractions import CycleTractions
     from workflow.models.contact import FaceContact
-    from workflow.models.loads import LoadSource
     from workflow.models.wear import Structure
 
 AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
@@ -78,11 +77,3 @@ class WearStructure(Generic[AnyWearCase]):
     finer: Callable[[AnyWearCase], Neighbour | None] = lambda _: None
     finer_cycles: Callable[[AnyWearCase, InterfaceState], list[CycleTractions] | None] = no_cycles
     settings: Callable[[AnyWearCase], Mapping[str, str]] = lambda _: {}
-
-    def source(self, case: AnyWearCase) -> LoadSource:
-        """Return the loads of the contacts of a case."""
-        # Solvers take a second to import, so they are imported only where they are used.
-        from workflow.analyses.wear.translation import model_with
-        from workflow.shell.folders.cache import DiskStore
-
-        return model_with(case, self.model(case)).loads(DiskStore())

@@ -63,7 +63,7 @@ def wear_of(case: WearCase) -> Wear:
 
 def face_contact(
     case: WearCase, face: ContactFace, stepper: WearStepper | None = None
-) -> FaceContact[InterfaceContact]:
+) -> FaceContact:
     """Return the half-space contact of a face.
 
     It wears by the steps of the case unless others are given.

@@ -8,7 +8,7 @@ import pytest
 from tests.conftest import CASES
 from wear.contact.interface import FirstContact
 from workflow.analyses.wear.checks.warnings import warn_of_contact
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.structures.resultants.model import given_loads
 from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case, parse_case, template
@@ -64,7 +64,7 @@ def test_energies_of_a_file_that_the_half_space_contradicts(tmp_path):
 def test_nodes_that_dissipate_what_the_half_space_does_not(tmp_path, share, warned):
     """Method full wears by the half-space's energies: 0.006, where the nodes have 36."""
     case = load_case(CASES / "dovetail_2d.yaml", COARSE)
-    source = structure_of(case).source(case)
+    source = loads_of(case)
     assert isinstance(source, StructureLoads)
     scene = begun(source, face_contact(case, source.faces[0]), source.unworn()[0])
     first: FirstContact = scene[-1]

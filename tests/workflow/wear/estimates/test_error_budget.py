@@ -28,6 +28,7 @@ from workflow.analyses.wear.budget.report import (
 )
 from workflow.analyses.wear.checks import run_errors
 from workflow.analyses.wear.checks.run_errors import REMEDIES
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.output.layout import PARTS
 from workflow.analyses.wear.output.outcome import InterfaceOutcome, peak_change
 from workflow.analyses.wear.structures import structure_of
@@ -104,8 +105,7 @@ def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> N
 
 
 def probe_cases_of(case) -> ProbeCases:
-    structure = structure_of(case)
-    return ProbeCases.of(case, structure, structure.source(case).line)
+    return ProbeCases.of(case, structure_of(case), loads_of(case).line)
 
 
 # --- peaks that wear steps leave ------------------------------------------------------------------
@@ -330,7 +330,7 @@ def deepest(case, source, kind="constant") -> float:
 @pytest.mark.slow
 def test_probe_runs_show_what_loads_that_follow_change(section, monkeypatch) -> None:
     """The references are probe runs with four times as many steps, with and without updates."""
-    cases, source = probe_cases_of(section), structure_of(section).source(section)
+    cases, source = probe_cases_of(section), loads_of(section)
     probed = replace(cases, neighbours={}).probed(source, lambda _: source)
     assert not probed.failures
     monkeypatch.setattr(probe_runs, "STEPS", 4 * STEPS)
@@ -371,17 +371,15 @@ def test_the_error_of_loads_that_follow_late_is_found(rest) -> None:
 @pytest.mark.slow
 def test_probe_runs_show_the_error_due_to_the_mesh(section) -> None:
     """Meshes of two orders and sizes are compared with one of negligible error."""
-    structure = structure_of(section)
     cases = probe_cases_of(section)
-    probed = cases.probed(structure.source(section), structure.source)
+    probed = cases.probed(loads_of(section), loads_of)
     assert not probed.failures
     errors = probed.errors["mesh"]["intrados"]
 
     fine = {"mesh.flank_nodes": (61, 61), "mesh.size": 1.5, "mesh.order": 2}
     truth = changed(cases.own, fine)
     own, exact = (
-        probe_run(case, structure.source(case), "every").worn["intrados"]
-        for case in (cases.own, truth)
+        probe_run(case, loads_of(case), "every").worn["intrados"] for case in (cases.own, truth)
     )
     for name in ("depth", "volume"):
         true = abs(own[name] / exact[name] - 1.0)

@@ -12,7 +12,7 @@ from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array
 from tests.workflow.mesh_scenes import STEEL, write_case
 from wear.contact.interface import FirstContact
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case
 from workflow.models.contact import FaceContact
@@ -87,7 +87,7 @@ class Blocks:
 def solved(path: Path, *settings: str) -> tuple[InterfaceHistory, FaceContact, FirstContact]:
     """Return the unworn cycle of the structure, the contact, and its first cycle."""
     case = load_case(path, list(settings))
-    source = structure_of(case).source(case)
+    source = loads_of(case)
     (history,), stage = source.unworn(), face_contact(case, source.faces[0])
     return history, stage, stage.contact.begin(history, 1.0)[1]
 

@@ -15,7 +15,7 @@ from sa_solver.types import Array, Frame, Grid, Material
 from tests.conftest import CASES
 from wear.cracking.bulk_stress import SIDE
 from wear.cracking.life import ruiz, smith_watson_topper
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case
 from workflow.models.contact import FaceContact
@@ -52,7 +52,7 @@ class Flank:
     @classmethod
     def of(cls, *overrides: str) -> "Flank":
         case = load_case(PLANE, overrides)
-        source = structure_of(case).source(case)
+        source = loads_of(case)
         assert isinstance(source, StructureLoads)
         states = {"unworn": (source.mesh, source.unworn_cycle)}
         stress = source.stresses(states)["unworn"]

@@ -9,8 +9,8 @@ from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array
 from wear.contact.interface import FirstContact
 from wear.contact.link import StructureLink
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.output.link_report import report_link
-from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.text.readable import percent
 from workflow.kinds import load_case
@@ -49,7 +49,7 @@ def test_what_a_fit_leaves_is_warned_of(tmp_path, quality, reported) -> None:
 def flank(path, nodes: int, *settings: str) -> tuple[InterfaceHistory, FaceContact, FirstContact]:
     """Return the unworn intrados of the section with ``nodes`` first-order nodes across it."""
     case = load_case(path, [f"mesh.flank_nodes=[{nodes}, 34]", "mesh.order=1", *settings])
-    source = structure_of(case).source(case)
+    source = loads_of(case)
     stage = face_contact(case, source.faces[0])
     history = source.unworn()[0]
     return history, stage, stage.contact.begin(history, 1.0)[1]

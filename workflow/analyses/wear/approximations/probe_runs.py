@@ -14,7 +14,7 @@ from typing import Any, Literal
 from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.normal.contact import NormalContactError
 from sa_solver.types import Array
-from wear.contact.interface import InterfaceContact, MotionError
+from wear.contact.interface import MotionError
 from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState
 from wear.schedule import CoupledSettings, JumpSize
@@ -50,7 +50,7 @@ LESSER_INTERFACE = 0.1
 class ProbeRun:
     """Contacts of a probe run, and its states from the unworn one to the last."""
 
-    contacts: list[FaceContact[InterfaceContact]]
+    contacts: list[FaceContact]
     states: list[CoupledState]
 
     @property

@@ -14,6 +14,7 @@ from workflow.analyses.wear.approximations.registry import PARTS
 from workflow.analyses.wear.budget.parts import ContactErrors, ErrorByResult, ResultError
 from workflow.analyses.wear.budget.probe_cases import ProbeCases, Probed, late, scaled
 from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.output import layout
 from workflow.analyses.wear.output.outcome import Outcome
 from workflow.analyses.wear.structures import structure_of
@@ -114,7 +115,7 @@ def _probed(
     case: WearCase, cases: ProbeCases[Any], source: LoadSource | None, progress: Progress = unseen
 ) -> Probed:
     """Return the errors from the probe runs of a case; ``source`` is that of its own structure."""
-    return cases.probed(source, structure_of(case).source, progress)
+    return cases.probed(source, loads_of, progress)
 
 
 def followed(outcome: Outcome) -> Array:

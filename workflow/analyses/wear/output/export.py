@@ -12,6 +12,7 @@ from fe_models.structure import InterfaceHistory
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.checks.warnings import warn_of_structure
 from workflow.analyses.wear.choice import report_choice
+from workflow.analyses.wear.model import loads_of
 from workflow.analyses.wear.recording import reported_stage
 from workflow.analyses.wear.run import meshed_faces
 from workflow.analyses.wear.structures import resultants, structure_of
@@ -55,7 +56,7 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
         )
     structure.memory(case, 0, 0).check()
     case, choice = structure.choose(case)
-    source = structure.source(case)
+    source = loads_of(case)
     assert isinstance(source, StructureLoads)
     with locked(out) as gone:
         folder = OutputFolder(out, "resultants")
