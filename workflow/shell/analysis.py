@@ -181,7 +181,7 @@ class Analysis(Generic[AnyCase]):
     run: Callable[[Run[AnyCase]], None]
     memory: Callable[[AnyCase], Memory]
     run_time: Callable[[AnyCase], RunTime]
-    quantities: Callable[[AnyCase, Summary], Sequence[SummaryQuantity]]
+    quantities: Callable[[AnyCase, Summary], Sequence[SummaryQuantity]] = lambda case, summary: ()
     layout: Callable[[AnyCase], Layout] = lambda case: Layout({})
     curves: Sequence[CurvesOf] = ()
     pictures: Callable[[], Pictures] | None = None
