@@ -88,7 +88,6 @@ HERTZ = Analysis(
     run=run_hertz,
     memory=no_memory,
     run_time=lambda case: RunTime(),
-    quantities=lambda case, summary: (),
 )
 # a³ = 3 F R / (4 E*): 100 N, 10 mm, E* = 100 GPa.
 RADIUS = 0.0075 ** (1.0 / 3.0)
