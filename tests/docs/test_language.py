@@ -6,7 +6,11 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)
+# Generated pages are not written by hand: references of cases and libraries, and the gallery.
+GENERATED = {
+    DOCS / name for name in ("_build", "reference/cases", "reference/libraries", "gallery")
+}
+PAGES = sorted(path for path in DOCS.rglob("*.md") if GENERATED.isdisjoint(path.parents))
 # Words of a sentence, and of a page that explains, above which a reader loses the thread.
 LONGEST_SENTENCE, LONGEST_PAGE = 35, 2000
 # Starts whose meaning depends on an earlier sentence, or comes later in the same one.
@@ -43,6 +47,12 @@ def unclear(path):
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(DOCS).as_posix())
 def test_sentences_are_short_and_begin_with_their_subject(path):
     assert unclear(path) == []
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(DOCS).as_posix())
+def test_files_of_tests_that_a_page_names_are_there(path):
+    named = re.findall(r"`(tests/[\w/.]+)", path.read_text(encoding="utf-8"))
+    assert [name for name in named if not (DOCS.parent / name).exists()] == []
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(DOCS).as_posix())
