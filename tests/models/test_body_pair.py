@@ -101,10 +101,10 @@ def test_a_stroke_wears_by_the_energy_of_friction():
 
 def test_friction_at_the_start_is_that_of_no_energy():
     """A table of friction that begins at a factor of 2 doubles the energy of the first cycle."""
-    from wear import CoulombFriction, EnergyTable
+    from wear import EnergyTable
 
     loads = fretscale.LoadTable.stroke(20.0, 0.02, increments=2)
-    doubled = CoulombFriction(0.3, EnergyTable((0.0, 1e9), (2.0, 2.0)))
+    doubled = fretscale.CoulombFriction(0.3, EnergyTable((0.0, 1e9), (2.0, 2.0)))
     other = fretscale.Contact((48, 1), (TITANIUM, TITANIUM), (LAW, LAW), friction=doubled)
     model = bodies(loads, line=True)
     (one,), (two,) = (model.source(of).unworn() for of in (contact((48, 1)), other))

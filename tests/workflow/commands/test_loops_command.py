@@ -139,7 +139,7 @@ GOOD = "displacement [um],force [N]\n" + "".join(f"{k % 7},{k % 5}\n" for k in r
         ("displacement [um]\n1\n", [], "force"),
         ("displacement,displacement,force\n1,2,3\n", [], "displacement"),
         ("displacement,force\n1,2\n1,2\n", [], "displacement"),
-        (GOOD, ["--normal-load", "60 mm"], "--normal-load 60 mm"),
+        (GOOD, ["--normal-load", "60 mm"], "--normal-load '60 mm'"),
         (GOOD, ["--normal-load", "-3 N"], "--normal-load"),
         (GOOD, ["--column", "force=F"], "F"),
         (GOOD, ["--fast"], "--fast"),
