@@ -32,7 +32,7 @@ FIELDS = declared("""
     depth_1, depth_2 | mm | cycles x y | worn off body #
     pressure | MPa | cycles x y | at peak load
     shear | MPa | cycles component x y | on body 2 at peak load
-    slip | mm | cycles component x y | of body 2 in the increment of peak load
+    slip | mm | cycles component x y | slip of body 2 in the increment of peak load
 """)
 SCALARS = declared("""
     largest_depth_1, largest_depth_2 | mm | cycles | largest depth worn off body #

@@ -122,7 +122,7 @@ def steps_of(case: WearCase, extent: Extent) -> ExpectedSteps:
 
     The number is unknown where a step wears a given depth or volume, unless the run stops at a
     given one, and where automatic steps follow the border of a zone that sticks: a cylinder on 512
-    strips took 60 jumps to its end state, other cases with the same tolerance take 20.
+    cells took 60 jumps to its end state, other cases with the same tolerance take 20.
     """
     wear, step = case.wear, case.wear.step
     if step.cycles is not None:

@@ -44,7 +44,7 @@ SCALARS = declared("""
     energy | N mm | cycles | dissipated so far
     energy_per_cycle | N mm | cycles | dissipated in a cycle
     stick_stiffness | N/mm | cycles | along x, all nodes in contact stuck
-    area | mm^2 | cycles | in contact
+    area | mm^2 | cycles | area in contact
     friction | 1 | cycles | largest tangential force over the normal force
 """)
 

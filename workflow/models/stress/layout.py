@@ -16,7 +16,7 @@ BODY = """
 """
 SECTION_AXES = """
     along | mm | along | centres of the section's cells, along its axis
-    depths | mm | depths | of the section's points below the surface
+    depths | mm | depths | depth of the section's points below the surface
 """
 SECTION = f"""
     stress | MPa | stress_component along depths | xx, yy, zz, xy, yz, zx in the section at peak

@@ -43,7 +43,7 @@ RIGID_MOTIONS = """
     twist | rad | {dim} | rotation of body 1 relative to body 2 about z
 """
 LOAD_HISTORY = f"""{LOADS.format(dim="increment")}
-    share | 1 | increment | of the mission's cycles among all cycles of the mix
+    share | 1 | increment | share of the mission's cycles among all cycles of the mix
     block | 1 | increment | mission of the mix, counted from 0
 """
 """Loads of a cycle; the last two are those of a mix of missions."""

@@ -18,7 +18,7 @@ _STABILITY = """
 # its dimension.
 _BRANCH = f"""
     frequency | Hz | point | frequency of the force, in the order of the curve
-    speed | rad/s | point | of the engine, by its order
+    speed | rad/s | point | speed of the engine, by its order
     {AMPLITUDES.format(dim="point")}{MOTIONS.format(dim="point")}{_STABILITY.format(dim="point")}
 """
 _HARMONICS = f"""
@@ -41,17 +41,17 @@ def layout_of(amount: ExcitationSize) -> Layout:
     return Layout.read(f"""
 linear{linear_limits(amount)}
 names
-    places | 1 | place | whose displacements have harmonics
-    joints | 1 | joint direction | stretch of every direction of every joint
+    places | 1 | place | name of a place whose displacements have harmonics
+    joints | 1 | joint direction | name of every direction of every joint, whose stretch has harmonics
 nodal_diameters
     diameters | 1 | diameters | nodal diameters of a wave
     free | Hz | diameters mode | lowest natural frequencies, without the joints
     stuck | Hz | diameters mode | lowest natural frequencies, all joints stuck
 contact
-    x, y | mm | joint | of each joint on the contact plane
+    x, y | mm | joint | place of each joint on the contact plane
     gap | mm | joint | gap of the bodies without load
     area | mm^2 | joint | area that belongs to each joint
-    normal_force | N | joint | of each joint at rest
+    normal_force | N | joint | force of each joint at rest
     normal_displacement | mm | joint | closing of each joint by the load at rest
 {response}, further_branches/<branch>{_BRANCH}
 {response}/nodes
@@ -59,11 +59,13 @@ contact
     separated | 1 | point joint | share of the cycle in which each joint is open
     energy | N mm | point joint | energy that each joint dissipates in a cycle
 {response}/resonance
-    displacement | mm | sample joint direction | of each joint along x, y, and its closing, in time
-    force | N | sample joint direction | of each joint along x, y and its pressure
+    displacement | mm | sample joint direction | motion of each joint along x, y, and its
+        closing, in time
+    force | N | sample joint direction | force of each joint along x, y, and its normal force
     state | 1 | sample joint | state of each joint: 0 sticks, 1 slips, 2 is open
 {response}/loops/<loop>
-    displacement | mm | point_of_loop | between the targets, or the mean of the joints, in a cycle
+    displacement | mm | point_of_loop | motion between the targets, or the mean of the joints, in a
+        cycle
     force | N | point_of_loop | force of all joints together along it
     expansion | N | point_of_loop | the same force in the harmonics of the motion alone
 {response}/at
@@ -72,10 +74,10 @@ contact
     error | 1 | motion | estimated error of vibration or energy lost, due to harmonics and
         samples
 {response}/harmonics/curve
-    frequency | Hz | point | f, in the order of the curve
+    frequency | Hz | point | frequency f, in the order of the curve
     {_HARMONICS.format(along="point", order="by point of the curve and harmonic")}
 {response}/harmonics/<motion>
-    frequency | Hz | | f, of the motion
+    frequency | Hz | | frequency f of the motion
     {_HARMONICS.format(along="", order="by harmonic")}
 backbone
     {name} | {amount.unit} | {name} | {amount.description}
@@ -90,7 +92,7 @@ backbone/bifurcations, force_sweeps/<sweep>/bifurcations{_bifurcations(amount)}
 modes/<mode>
     amplitude | mm | modal_amplitude | {_LOOKED_AT}, in the order of the curve
     modal_amplitude | t^0.5 mm | modal_amplitude | norm of harmonic 1 by the mass
-    frequency | Hz | modal_amplitude | of the mode
+    frequency | Hz | modal_amplitude | frequency of the mode
     damping | 1 | modal_amplitude | damping ratio of the mode: energy lost over
         2ω ∫ x'ᵀ M x' dt
     energy_per_cycle | N mm | modal_amplitude | energy that the joints dissipate in a cycle
@@ -107,11 +109,14 @@ def bifurcation_columns(amount: ExcitationSize) -> Declarations:
 
 def _bifurcations(amount: ExcitationSize) -> str:
     return f"""
-    frequency | Hz | bifurcation | of the force
+    frequency | Hz | bifurcation | frequency of the force
     {amount.name} | {amount.unit} | bifurcation | {amount.description}
     amplitude | mm | bifurcation | {_LOOKED_AT}
-    multiplier | 1 | bifurcation | size of the one that passes the circle there
-    multiplier_angle | rad | bifurcation | its angle: 0 of a fold, pi where the period doubles
-    unstable_before | 1 | bifurcation | multipliers beyond the circle before, NaN where unknown
-    unstable_after | 1 | bifurcation | and at the point after
+    multiplier | 1 | bifurcation | size of the multiplier that passes the unit circle there
+    multiplier_angle | rad | bifurcation | angle of this multiplier: 0 at a fold, pi where the period
+        doubles
+    unstable_before | 1 | bifurcation | number of multipliers beyond the unit circle before, NaN
+        where unknown
+    unstable_after | 1 | bifurcation | number of multipliers beyond the unit circle after, NaN where
+        unknown
 """

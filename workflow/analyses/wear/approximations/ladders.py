@@ -63,7 +63,7 @@ def grids(case: Case) -> Iterator[Rung]:
         finer = [2 * round(0.5 * factor * count) for count in cells[: 1 if line else 2]]
         if min(finer) < FEWEST_CELLS:
             continue
-        name = f"{finer[0]} strips" if line else " x ".join(map(str, finer))
+        name = f"{finer[0]} cells" if line else " x ".join(map(str, finer))
         yield Rung(name, {"contact.grid": [*finer, *cells[len(finer) :]]}, 1.0 / finer[0])
 
 

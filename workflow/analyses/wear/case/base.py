@@ -184,7 +184,7 @@ class WearCase(WithScans, Case):
     def outline(self) -> list[tuple[str, str]]:
         grid, wear = self.contact.grid, self.wear
         plane = getattr(self.structure, "dimension", 3) == 2 or grid[1] == 1
-        cells = f"{grid[0]} strips" if plane else f"{grid[0]} x {grid[1]} cells"
+        cells = f"{grid[0]} cells" if plane else f"{grid[0]} x {grid[1]} cells"
         steps = f"{wear.step.kind} steps, {wear.step_size}"
         changes = "" if self.friction.evolution is None else ", changing with dissipated energy"
         sides = self.face_sides()

@@ -33,7 +33,7 @@ from workflow.case.changing import changed
 from workflow.errors import MethodFailed
 from workflow.models.structure import StructureLoads
 
-# Settings of a probe run along the axes that it does not vary: strips across a flank, nodes across
+# Settings of a probe run along the axes that it does not vary: cells across a flank, nodes across
 # it, and increments up to the peak and after it. Differences along one axis hardly depend on them.
 STRIPS, NODES, LEGS = 64, 10, (4, 7)
 # Elements round a fillet, whose stress no probe run needs.

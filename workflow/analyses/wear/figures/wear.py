@@ -348,4 +348,4 @@ def _cycles(file: h5py.File, interface: str, jump: str) -> str:
 
 def _cells(grid: Grid) -> str:
     """Return the grid's size in words."""
-    return f"{grid.shape[0]} strips" if grid.line else f"{grid.shape[0]} x {grid.shape[1]}"
+    return f"{grid.shape[0]} cells" if grid.line else f"{grid.shape[0]} x {grid.shape[1]}"

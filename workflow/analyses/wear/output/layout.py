@@ -28,12 +28,12 @@ FACE_MESH = """
 """
 FACE = f"""{FACE_MESH.format(node="node", facet="facet")}
     {TRACTIONS.format(cells="increment node", vectors="increment component node")}
-    force | N | increment axis node | of body 1 on body 2 at the nodes, x, y and z
-    displacement | mm | increment axis node | of body 2 relative to body 1 since both were unloaded
-        and unworn, x, y and z
+    force | N | increment axis node | force of body 1 on body 2 at the nodes, x, y and z
+    displacement | mm | increment axis node | motion of body 2 relative to body 1 since both were
+        unloaded and unworn, x, y and z
 """
 CYCLES = """
-    cycles | 1 | cycles | cycles
+    cycles | 1 | cycles | cycles computed so far
 """
 KINETICS = """
     depth_1, depth_2 | mm | cycles | largest worn depth of body #
@@ -42,7 +42,7 @@ KINETICS = """
     area | mm^2 | cycles | area in contact
 """
 _ERROR = f"""1 | part | estimated relative errors by {", ".join(PARTS)},
-        above 0 where too much is told, and their total"""
+        above 0 where the result is too large, and their total"""
 LAYOUT = Layout.read(
     f"""
 grid/<face>{GRID}
@@ -65,13 +65,14 @@ comparison/<face>/<increment>{ON_GRID}
 kinetics{CYCLES}
 kinetics/<face>{KINETICS}
 loops/<face>/<jump>
-    displacement | mm | point | of body 1 relative to body 2 along the axis, from the pressed state
+    displacement | mm | point | motion of body 1 relative to body 2 along the axis, from
+        the pressed state
     force | N | point | tangential force on body 2
 loops_over_energy/<face>
     {OVER_ENERGY}
 bolts/<bolt>
     tension | N | cycles | tension at peak load after each jump, as the loads were last solved
-    tension_unworn, tension_worn | N | increment | in each increment, as far as it is meshed, #
+    tension_unworn, tension_worn | N | increment | tension in each increment, of the meshed part, #
 bodies/<body>/error
     notch_stress | {_ERROR}
 bodies/<body>/<moment>{BODY}

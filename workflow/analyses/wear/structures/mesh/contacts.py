@@ -124,7 +124,7 @@ def own_terms(pair: ContactPairSection) -> str:
         parts += [f"{title} {text}" for title, text in wearing(bodies)]
     if pair.grid is not None:
         line = pair.grid[1] == 1
-        parts.append(f"{pair.grid[0]} {'strips' if line else f'x {pair.grid[1]} cells'}")
+        parts.append(f"{pair.grid[0]} {'cells' if line else f'x {pair.grid[1]} cells'}")
     return f"{pair.name}: {', '.join(parts)}" if parts else ""
 
 
