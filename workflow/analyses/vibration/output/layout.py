@@ -42,7 +42,8 @@ def layout_of(amount: ExcitationSize) -> Layout:
 linear{linear_limits(amount)}
 names
     places | 1 | place | name of a place whose displacements have harmonics
-    joints | 1 | joint direction | name of every direction of every joint, whose stretch has harmonics
+    joints | 1 | joint direction | name of every direction of every joint, whose stretch has
+        harmonics
 nodal_diameters
     diameters | 1 | diameters | nodal diameters of a wave
     free | Hz | diameters mode | lowest natural frequencies, without the joints
@@ -112,7 +113,7 @@ def _bifurcations(amount: ExcitationSize) -> str:
     frequency | Hz | bifurcation | frequency of the force
     {amount.name} | {amount.unit} | bifurcation | {amount.description}
     amplitude | mm | bifurcation | {_LOOKED_AT}
-    multiplier | 1 | bifurcation | size of the multiplier that passes the unit circle there
+    multiplier | 1 | bifurcation | size of the multiplier that passes the unit circle
     multiplier_angle | rad | bifurcation | angle of this multiplier: 0 at a fold, pi where the period
         doubles
     unstable_before | 1 | bifurcation | number of multipliers beyond the unit circle before, NaN
