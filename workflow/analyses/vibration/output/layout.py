@@ -114,8 +114,8 @@ def _bifurcations(amount: ExcitationSize) -> str:
     {amount.name} | {amount.unit} | bifurcation | {amount.description}
     amplitude | mm | bifurcation | {_LOOKED_AT}
     multiplier | 1 | bifurcation | size of the multiplier that passes the unit circle
-    multiplier_angle | rad | bifurcation | angle of this multiplier: 0 at a fold, pi where the period
-        doubles
+    multiplier_angle | rad | bifurcation | angle of this multiplier: 0 at a fold, pi if the
+        period doubles
     unstable_before | 1 | bifurcation | number of multipliers beyond the unit circle before, NaN
         where unknown
     unstable_after | 1 | bifurcation | number of multipliers beyond the unit circle after, NaN where
