@@ -31,19 +31,19 @@ if TYPE_CHECKING:
 # model.
 MOST_BLOCKS = 20_000
 COORDINATES = declared("""
-    cycles | 1 | cycles | at the start of each block
+    cycles | 1 | cycles | cycles at the start of each block
     x, y | mm | node | place of the node on the pad
 """)
 FIELDS = declared("""
-    depth_1, depth_2 | mm | cycles node | worn off body #
+    depth_1, depth_2 | mm | cycles node | worn depth of body #
     pressure | MPa | cycles node | normal pressure
     slip | mm | cycles node | path that the node slides in a cycle
 """)
 SCALARS = declared("""
-    volume_1, volume_2 | mm^3 | cycles | worn off body #
-    energy | N mm | cycles | dissipated so far
-    energy_per_cycle | N mm | cycles | dissipated in a cycle
-    stick_stiffness | N/mm | cycles | along x, all nodes in contact stuck
+    volume_1, volume_2 | mm^3 | cycles | worn volume of body #
+    energy | N mm | cycles | energy dissipated so far
+    energy_per_cycle | N mm | cycles | energy dissipated in a cycle
+    stick_stiffness | N/mm | cycles | stiffness along x, with all nodes in contact stuck
     area | mm^2 | cycles | area in contact
     friction | 1 | cycles | largest tangential force over the normal force
 """)
