@@ -18,7 +18,7 @@ from tests.reduced_pads import FRICTION, STROKE, coarse_pads
 from tests.workflow.vibration.time_scenes import RIG, run
 from wear.joints.jenkins import Jenkins
 from workflow.analyses.specimens.run import QUARTER
-from workflow.analyses.wear.approximations.convergence import richardson
+from workflow.models.budget.convergence import richardson
 
 # --- Newmark's steps ------------------------------------------------------------------------------
 

@@ -24,9 +24,9 @@ from tests.workflow.command_line import command, invoke, runs_here
 from tests.workflow.mesh_scenes import pressed_blocks
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear import run as wear_run
-from workflow.analyses.wear.budget.probe_cases import Probed
 from workflow.analyses.wear.output.layout import WearContents
 from workflow.kinds import kinds
+from workflow.models.budget.probe_models import Probed
 from workflow.pictures import drawing
 from workflow.runs import run as running
 from workflow.shell import processes

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from math import inf, nan
 
 from workflow.analyses.wear.approximations.approximation import Approximation, Rung
-from workflow.analyses.wear.approximations.convergence import Convergence, richardson
 from workflow.chart.costs import RunCost
 from workflow.chart.frontier import Option, efficient
+from workflow.models.budget.convergence import Convergence, richardson
 
 # Relative changes of a quantity below this are rounding, and say nothing about convergence.
 ROUNDING = 1e-12

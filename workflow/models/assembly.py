@@ -35,7 +35,10 @@ from sa_solver.types import Array, Indices, Material
 from workflow.models.faces import face_size, planes_of_symmetry
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
-from workflow.models.structure_model import LoadCycle, Nonlinearity, Remark
+from workflow.models.structure_model import FinerMesh, LoadCycle, Nonlinearity, Remark
+
+# Largest number of nodes in space for cheap second-order elements, which have seven times as many.
+MOST_NODES = 4000
 
 
 @dataclass(frozen=True)
@@ -233,7 +236,7 @@ class MeshAssembly:
         """Return the interface with the gap that is added to that of the meshes."""
         if interface.name not in self.added:
             return interface
-        nodal = self.added[interface.name].at_nodes(interface.coordinates)
+        nodal = self.added[interface.name].at_nodes(interface)
         return replace(interface, gap=interface.gap + nodal)
 
     def structure(self, mesh: StructureMesh) -> Structure:
@@ -263,6 +266,16 @@ class MeshAssembly:
 
     def node_numbers(self, place: int) -> Indices:
         return self.imported.node_numbers[self._mesh.bodies[place].name]
+
+    def section(self) -> None:
+        """Return None: bodies of a file need not be the same all along."""
+
+    def finer_mesh(self) -> FinerMesh | None:
+        """Return the bodies with elements of second order, if they are of first order and few."""
+        cheap = self._plain.interfaces[0].line or self._plain.node_count(1) <= MOST_NODES
+        if self.order == 2 or not cheap:
+            return None
+        return FinerMesh(replace(self, order=2, joined=None))
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
         """Return the unit of the mesh, and contacts that supports or planes of symmetry cut."""

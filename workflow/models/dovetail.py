@@ -17,12 +17,19 @@ from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.structure import Structure
 from sa_solver.errors import InputError
 from sa_solver.types import Material
+from workflow.models.budget.convergence import MESH_ORDER, share_of_difference
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
-from workflow.models.structure_model import LoadCycle, Nonlinearity, Remark
+from workflow.models.structure_model import FinerMesh, LoadCycle, Nonlinearity, Remark
 
 SIDES = {"intrados": 1, "extrados": -1}
 """Flanks by name: the one at X > 0 and the one at X < 0."""
+
+# Increments up to the peak and after it in probe runs. Differences of probe runs hardly depend on
+# them.
+FEW_INCREMENTS = 4, 7
+# Least number of nodes across and along a flank.
+FEWEST_NODES = 3
 
 
 @dataclass(frozen=True)
@@ -52,6 +59,13 @@ class DovetailMesh:
     size: float = 5.0
     notch: int = 48
     order: Literal[1, 2] = 1
+
+    def refined(self, factor: float) -> DovetailMesh:
+        """Return the mesh with elements that are finer by ``factor``; its notches stay the same."""
+        across, along = (
+            max(FEWEST_NODES, 1 + round(factor * (count - 1))) for count in self.flank_nodes
+        )
+        return replace(self, flank_nodes=(across, along), size=self.size / factor)
 
 
 @dataclass(frozen=True)
@@ -159,7 +173,7 @@ class DovetailJoint:
         """Return the flank with the gap that is added to its form."""
         if flank.name not in self.added:
             return flank
-        nodal = self.added[flank.name].at_nodes(flank.coordinates)
+        nodal = self.added[flank.name].at_nodes(flank)
         return replace(flank, gap=flank.gap + nodal)
 
     def structure(self, mesh: StructureMesh) -> Structure:
@@ -185,6 +199,31 @@ class DovetailJoint:
 
     def node_numbers(self, place: int) -> None:
         """Return None: the mesh is generated."""
+
+    def section(self) -> DovetailJoint:
+        """Return the section in plane strain under few increments, with the same mesh in it.
+
+        The gaps that are added to a joint in space are not part of it.
+        """
+        up, down = FEW_INCREMENTS
+        return replace(
+            self,
+            geometry=replace(self.geometry, skew=0.0),
+            missions=tuple(
+                replace(mission, increments=up + down, peak_at=up) for mission in self.missions
+            ),
+            dimension=2,
+            added=self.added if self.dimension == 2 else {},
+        )
+
+    def finer_mesh(self) -> FinerMesh:
+        """Return the joint on a mesh of half the size and second order.
+
+        The difference is all of the error of a mesh of first order, and is extrapolated for one of
+        second order.
+        """
+        share = 1.0 if self.order == 1 else share_of_difference(2.0, MESH_ORDER)
+        return FinerMesh(replace(self, mesh=replace(self.mesh.refined(2.0), order=2)), share)
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
         """Yield remarks: sides that a moment would move, and a joint that locks itself."""

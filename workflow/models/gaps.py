@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sa_solver.types import Array, Grid
+
+if TYPE_CHECKING:
+    from fe_models.meshes.structure_mesh import Interface
 
 GapFunction = Callable[[Array, Array], Array]
 """Return the gap ``(n, m)`` [mm] at ``x`` ``(n, 1)`` and ``y`` ``(1, m)`` of the face [mm]."""
@@ -22,8 +26,8 @@ class AddedGap:
     over : GapFunction
         The gap [mm] at x and y of the face's frame.
     nodal : callable, optional
-        Returns the gap at the nodes of the face ``(n,)`` [mm]. Without it ``over`` is sampled
-        there; give it where ``over`` has more detail than the facets can follow.
+        Returns the gap at the nodes ``(n,)`` [mm] of a meshed face, which it is given. Without it
+        ``over`` is sampled there; give it where ``over`` has more detail than facets can follow.
 
     Examples
     --------
@@ -32,18 +36,18 @@ class AddedGap:
     >>> import numpy as np
     >>> import fretscale
     >>> groove = fretscale.AddedGap(lambda x, y: 2e-3 * np.exp(-(x**2)) + 0.0 * y)
-    >>> print(groove.at_nodes(np.array([[0.0, 1.0], [1.0, 0.0]])))
+    >>> print(groove.over(np.array([[0.0], [1.0]]), np.zeros((1, 1))).ravel())
     [0.002      0.00073576]
     """
 
     over: GapFunction
-    nodal: Callable[[], Array] | None = None
+    nodal: Callable[[Interface], Array] | None = None
 
-    def at_nodes(self, coordinates: Array) -> Array:
-        """Return the gap at nodes of these ``coordinates`` ``(n, 2)`` [mm]."""
+    def at_nodes(self, face: Interface) -> Array:
+        """Return the gap at the nodes of a meshed face ``(n,)`` [mm]."""
         if self.nodal is not None:
-            return self.nodal()
-        points = np.asarray(coordinates)[:, :, None, None]
+            return self.nodal(face)
+        points = face.coordinates[:, :, None, None]
         return np.array([float(np.asarray(self.over(x, y))[0, 0]) for x, y in points])
 
     def on(self, form: GapFunction) -> GapFunction:

@@ -81,7 +81,8 @@ class WearResults:
     after every jump (``cycles``), depths, volumes and energy, and the resultants of the closed
     cycle, ``unworn`` and at the end (``state``). In a ``line`` contact forces, moments, energies
     and volumes are per length. Attributes of a face are the relative errors of depth and volume due
-    to the wear steps; what mesh, grid and increments leave is estimated by ``fretscale run`` only.
+    to the wear steps; ``fretscale.error_budget`` estimates what mesh, grid and increments
+    leave.
     The groups of ``stress`` are added, if there is any.
     """
 

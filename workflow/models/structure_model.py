@@ -62,6 +62,17 @@ class Remark(NamedTuple):
     is_warning: bool = True
 
 
+@dataclass(frozen=True)
+class FinerMesh:
+    """A ``structure`` on a finer mesh than another.
+
+    The error due to the other mesh is ``share`` times the difference of their results.
+    """
+
+    structure: StructureModel
+    share: float = 1.0
+
+
 class StructureModel(Protocol):
     """A structure of finite elements: its mesh, loads, supports and contact faces.
 
@@ -123,6 +134,14 @@ class StructureModel(Protocol):
 
         ``place`` is the body's place among those of the mesh.
         """
+        ...
+
+    def section(self) -> StructureModel | None:
+        """Return a plane section that represents the structure in probe runs, if there is one."""
+        ...
+
+    def finer_mesh(self) -> FinerMesh | None:
+        """Return the structure on a finer mesh for probe runs, or None without a cheap one."""
         ...
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterable[Remark]:

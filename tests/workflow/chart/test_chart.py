@@ -10,7 +10,6 @@ import pytest
 from sa_solver.types import Grid
 from tests.marks import slow
 from workflow.analyses.wear.approximations.approximation import Approximation, Rung
-from workflow.analyses.wear.approximations.convergence import richardson
 from workflow.analyses.wear.output.measures import profile_difference
 from workflow.case.text.writing import dump_case
 from workflow.chart import Chart
@@ -20,6 +19,7 @@ from workflow.chart.frontier import Option, cheapest, efficient
 from workflow.chart.ladder import Point, judge
 from workflow.errors import UserError
 from workflow.kinds import load_case
+from workflow.models.budget.convergence import richardson
 
 # --- frontier -----------------------------------------------------------------------------------
 

@@ -1,6 +1,7 @@
 """Tests of measured surfaces on mesh faces and file loads, compared with the given form."""
 
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -62,6 +63,19 @@ def test_a_form_from_scans_is_the_form(tmp_path):
     mesh = mesh_assembly(load_case(path)).meshed()
     (face,), form = mesh.interfaces, form_of(mesh)
     np.testing.assert_allclose(form[1][face.nodes_2, 1], face.gap, atol=1e-12)
+
+
+def test_scans_on_a_shape_are_there_in_another_process_and_on_a_finer_mesh(tmp_path):
+    """Probe runs in the plane wear in a process of their own; a sum of gaps goes there too."""
+    path, scan = PLANE.press(tmp_path, 1.0, 50.0), {**BARE, "pitch": [0.4, 1.0]}
+    np.save(tmp_path / "lower.npy", np.linspace(0.0, 1e-3, 120)[:, None])
+    shape = YAML(typ="safe").load(path.read_text("utf-8"))["structure"]["contacts"][0]["gap"]
+    with_surfaces(path, body_1={"file": "lower.npy", **scan})
+    model = mesh_assembly(load_case(path, [f"structure.contacts.0.gap={json.dumps(shape)}"]))
+    (face,) = model.meshed().interfaces
+    sent = pickle.loads(pickle.dumps(model))
+    (finer,) = sent.finer_mesh().structure.meshed().interfaces  # with the same vertices
+    np.testing.assert_allclose(finer.gap, face.gap, atol=1e-12)
 
 
 @pytest.fixture

@@ -39,6 +39,21 @@ def scan(folder, name, heights, pitch):
     return {**BARE, "file": str(folder / f"{name}.npy"), "pitch": list(pitch)}
 
 
+def test_a_finer_mesh_of_the_joint_has_the_scans_at_its_own_nodes(tmp_path):
+    """A slope is that of the scan within the steps of eight cells a facet, half of 1.2 mm / 8."""
+    x, tilt = (np.arange(1100) + 0.5) / 100.0 - 5.5, 1e-4
+    slope = scan(tmp_path, "slope", -tilt * x[:, None], (0.01, 1.0))
+    sets = "mesh.flank_nodes=[10, 8]", "mesh.size=8 mm", "contact.grid=[64, 1]"
+    joints = [
+        dovetail_joint(load_case(PLANE, [*sets, *given])).section().finer_mesh().structure
+        for given in ([], [surfaces(intrados={"disk": slope})])
+    ]
+    bare, scanned = (joint.meshed().interfaces[0] for joint in joints)
+    assert len(scanned) == 2 * (10 - 1) + 1
+    expected = tilt * scanned.coordinates[:, 0]
+    np.testing.assert_allclose(scanned.gap - bare.gap, expected, atol=0.5 * tilt * 1.2 / 8)
+
+
 @pytest.mark.slow
 def test_edges_from_scans_are_the_edges(tmp_path):
     """Arcs are given as profiles, partly on either body; balance and pressure converge.

@@ -22,14 +22,13 @@ import numpy as np
 from fe_models.structure import InterfaceHistory
 from sa_solver.cycles.increments import depth_and_energy, errors_of_increments, friction_work
 from sa_solver.types import Array, Mask
-from workflow.analyses.wear.approximations.convergence import share_of_difference
-from workflow.analyses.wear.approximations.ladders import INCREMENTS_ORDER
-from workflow.analyses.wear.approximations.probe_runs import LESSER_INTERFACE
 from workflow.analyses.wear.case.base import MOST_INCREMENTS, FiniteElementCase
 from workflow.analyses.wear.choice import Decision, record_of
 from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
+from workflow.models.budget.convergence import INCREMENTS_ORDER, share_of_difference
+from workflow.models.budget.probe_runs import LESSER_INTERFACE
 from workflow.models.structure_model import StructureModel
 
 # Least increments of a leg. Two cause 6 % of error in the depth of a dovetail but an estimate of

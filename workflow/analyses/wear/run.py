@@ -26,7 +26,7 @@ from workflow.analyses.wear.checks.warnings import (
 from workflow.analyses.wear.choice import report_choice
 from workflow.analyses.wear.contact_workers import WorkerCalls, contact_workers
 from workflow.analyses.wear.model import wear_model
-from workflow.analyses.wear.output.outcome import InterfaceOutcome, Outcome
+from workflow.analyses.wear.output.outcome import Outcome
 from workflow.analyses.wear.output.results import write_output
 from workflow.analyses.wear.recording import FileRecorder, RunLog, reported_stage
 from workflow.analyses.wear.structures import structure_of
@@ -35,6 +35,7 @@ from workflow.analyses.wear.structures.resultants.writing import marched
 from workflow.analyses.wear.translation import check_section
 from workflow.analyses.wear.worn.worn_structure import nonlinearity_sentence
 from workflow.errors import MethodFailed, UserError
+from workflow.models.budget.budget import interface_outcomes
 from workflow.models.contact import ContactEnd, last_cycle
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import ContactFace, LoadSource
@@ -89,7 +90,7 @@ def _compute(
     workers = working.enter_context(contact_workers(case, faces if in_workers else ()))
     with reported_stage(reporter, source, "condensation", "steps"):
         source.prepare()
-    probe_results = begin_probe_runs(case, source, run.worker)
+    probe_results = begin_probe_runs(case, model, source, run.worker)
     with one_thread():
         with reported_stage(reporter, source, "structural friction", "increments"):
             unworn = source.unworn()
@@ -109,13 +110,8 @@ def _compute(
         if in_workers:
             answers = workers.begin(last_cycle, states)  # at once, while stress is computed here
         ends = _last_cycles(answers, working, len(faces))
-    columns = contacts.stages, unworn, first, states, ends
-    finer = partial(structure_of(case).finer_cycles, case)
-    interfaces = [
-        InterfaceOutcome(*column, state.cycles, state.kinetics[:, number], finer)
-        for number, column in enumerate(zip(*columns, strict=True))
-    ]
-    return Outcome(case, source, state, interfaces), probe_results
+    interfaces = interface_outcomes(model, contacts.stages, unworn, first, states, ends, state)
+    return Outcome(case, model, source, state, interfaces), probe_results
 
 
 def _last_cycles(

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from math import prod
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from workflow.analyses.wear.approximations.approximation import Neighbour
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.run_time import Extent
 from workflow.shell.analysis import as_written
 from workflow.shell.memory import Memory, factor_bytes
 
 if TYPE_CHECKING:
-    from wear.contact.interface import InterfaceState
-    from wear.contact.tractions import CycleTractions
     from workflow.models.contact import FaceContact
     from workflow.models.wear import Structure
 
@@ -46,10 +43,6 @@ def memory(
     return Memory(dense + cells * kept, remedy, factor_bytes(nodes))
 
 
-def no_cycles(case: WearCase, state: InterfaceState) -> None:
-    """Return None: the loads between two increments, or slips due to friction, are unknown."""
-
-
 @dataclass(frozen=True)
 class WearStructure(Generic[AnyWearCase]):
     """A kind of structure: functions of a case that a wear run calls.
@@ -58,12 +51,8 @@ class WearStructure(Generic[AnyWearCase]):
     of loads. ``extent`` returns the size of its loads, for the time estimate, and ``memory`` the
     memory of a run, given the nodes of both bodies and of all interfaces (0: unknown). ``choose``
     returns the case with its open settings decided, and a record of why. ``warnings`` are about the
-    unworn contact of a stage under a peak load [N]. ``section`` returns a plane section that
-    represents the case in probe runs, and ``finer`` a finer mesh, if there is a cheap one.
-    ``finer_cycles`` returns the unworn cycle and that on the surfaces of a state in
-    twice as many increments, if the loads in between are known and the half-space solves for the
-    slips. ``settings`` returns the settings that reduce parts of the error, where they differ from
-    those of all cases.
+    unworn contact of a stage under a peak load [N]. ``settings`` returns the settings that reduce
+    parts of the error, where they differ from those of all cases.
     """
 
     name: str
@@ -73,7 +62,4 @@ class WearStructure(Generic[AnyWearCase]):
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
     warnings: Callable[[AnyWearCase, FaceContact, float], Iterable[str]] = lambda *_: ()
-    section: Callable[[AnyWearCase], AnyWearCase | None] = lambda _: None
-    finer: Callable[[AnyWearCase], Neighbour | None] = lambda _: None
-    finer_cycles: Callable[[AnyWearCase, InterfaceState], list[CycleTractions] | None] = no_cycles
     settings: Callable[[AnyWearCase], Mapping[str, str]] = lambda _: {}

@@ -9,6 +9,7 @@ Cases
 Models in Python
     - ``WearModel``: a structure, its contacts and how they wear; ``run`` computes the wear.
     - ``wear_model``: the model that a case describes.
+    - ``error_budget``: the estimated errors of the main results of a wear model.
     - ``DovetailJoint``, ``DovetailMesh``, ``Dovetail``, ``Mission``: the built-in blade root in its
       disk: the joint, its mesh, its section and its loads.
     - ``MeshAssembly``, ``LegPath``, ``TightenedBolt``: bodies of a mesh or CAD file under loads.
@@ -139,6 +140,7 @@ if TYPE_CHECKING:
     from workflow.interface.results import MainResult, Results, open  # noqa: A004
     from workflow.interface.running import run
     from workflow.models.assembly import LegPath, MeshAssembly, TightenedBolt
+    from workflow.models.budget.budget import error_budget
     from workflow.models.contact import Contact, Wear
     from workflow.models.dovetail import DovetailJoint, DovetailMesh
     from workflow.models.gaps import AddedGap
@@ -205,6 +207,7 @@ __all__ = [
     "WearingJoint",
     "check",
     "compare",
+    "error_budget",
     "fit",
     "load_case",
     "open",

@@ -113,7 +113,7 @@ class ReducedSpecimens:
         mesh = meshed_specimens(model.specimen, model.size)
         (face,) = mesh.interfaces
         if model.added is not None:
-            face = replace(face, gap=face.gap + model.added.at_nodes(face.coordinates))
+            face = replace(face, gap=face.gap + model.added.at_nodes(face))
         return replace(mesh, interfaces=(face,)).weighted(model.order)
 
     @property

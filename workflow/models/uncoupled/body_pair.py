@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -90,6 +90,11 @@ class BodyPair:
         checks.choice("tilt", self.tilt, ("held", "free"))
         if problem := conflict(self.loads.columns):
             raise InputError(f"loads of two bodies: {': '.join(problem)}")
+
+    def in_parts(self, parts: int) -> BodyPair:
+        """Return the bodies under the same cycle with each increment split into equal ``parts``."""
+        peak = None if self.peak is None else parts * self.peak
+        return replace(self, loads=self.loads.in_parts(parts), peak=peak)
 
     def source(self, contact: Contact) -> BodyPairSource:
         """Return the loads of the bodies with the materials and the friction of a contact.

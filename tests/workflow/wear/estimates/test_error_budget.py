@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from fe_models.meshes.structure_mesh import MeshError
+from sa_solver.types import LoadHistory, Material
 from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import settings
+from wear.coupled_state import Observer
+from wear.laws import EnergyLaw
 from workflow.analyses.wear import run
-from workflow.analyses.wear.approximations import probe_runs
-from workflow.analyses.wear.approximations.probe_runs import STEPS, Numbers, probe_run
-from workflow.analyses.wear.budget import finding, probe_cases
-from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_lowered
-from workflow.analyses.wear.budget.probe_cases import ProbeCases, late, scaled
+from workflow.analyses.wear.approximations.registry import REMEDIES
+from workflow.analyses.wear.budget import finding
 from workflow.analyses.wear.budget.report import (
     arrays_of,
     sentences,
@@ -27,13 +27,22 @@ from workflow.analyses.wear.budget.report import (
     warning_of,
 )
 from workflow.analyses.wear.checks import run_errors
-from workflow.analyses.wear.checks.run_errors import REMEDIES
-from workflow.analyses.wear.model import loads_of
-from workflow.analyses.wear.output.layout import PARTS
-from workflow.analyses.wear.output.outcome import InterfaceOutcome, peak_change
-from workflow.analyses.wear.structures import structure_of
-from workflow.case.changing import changed
+from workflow.analyses.wear.model import wear_model
 from workflow.kinds import load_case
+from workflow.models.budget import probe_models, probe_runs
+from workflow.models.budget.budget import error_budget, followed
+from workflow.models.budget.names import PARTS
+from workflow.models.budget.outcome import InterfaceOutcome, peak_change
+from workflow.models.budget.parts import UNCERTAIN, ResultError, peak_lowered
+from workflow.models.budget.probe_models import ProbeModels, late, scaled
+from workflow.models.budget.probe_runs import STEPS, Numbers, probe_run
+from workflow.models.contact import Contact, Wear
+from workflow.models.loads import ContactFace, LoadSource
+from workflow.models.uncoupled.body_pair import BodyPair
+from workflow.models.uncoupled.given_loads import GivenLoads
+from workflow.models.uncoupled.load_table import LoadTable
+from workflow.models.wear import WearModel
+from workflow.shell.folders.cache import DiskStore
 
 CASES = Path(__file__).parents[4] / "cases"
 QUIET = ("output.figures=false", "output.paraview=false", "stress.section=none")
@@ -104,8 +113,12 @@ def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> N
     assert REMEDIES["mesh"] in line
 
 
-def probe_cases_of(case) -> ProbeCases:
-    return ProbeCases.of(case, structure_of(case), loads_of(case).line)
+def loads_of(model: WearModel) -> LoadSource:
+    return model.loads(DiskStore())
+
+
+def probes_of(model: WearModel) -> ProbeModels:
+    return ProbeModels.of(model, loads_of(model))
 
 
 # --- peaks that wear steps leave ------------------------------------------------------------------
@@ -242,48 +255,56 @@ def test_advice_on_loads_that_follow_helps(own, dovetail) -> None:
 # --- probe runs -----------------------------------------------------------------------------------
 
 
+COARSE_SECTION = ("mesh.flank_nodes=[12, 12]", "mesh.size=8 mm", "contact.grid=[64, 64]")
+COARSE_SECTION += ("mesh.order=1",)
+
+
 @pytest.fixture(scope="module")
-def section():
+def section() -> WearModel:
     """Return the section of the default joint on a coarse mesh of first order."""
-    coarse = "mesh.flank_nodes=[12, 12]", "mesh.size=8 mm", "contact.grid=[64, 64]"
-    return load_case(CASES / "dovetail_2d.yaml", [*coarse, "mesh.order=1"])
+    return wear_model(load_case(CASES / "dovetail_2d.yaml", COARSE_SECTION))
 
 
-def neighbour(cases: ProbeCases, part: str):
-    """Return the probe case with the other setting of a part."""
-    return changed(cases.own, cases.neighbours[part].settings)
+def neighbour(probes: ProbeModels, part: str) -> WearModel:
+    """Return the probe model with the other setting of a part."""
+    return probes.neighbours[part].model
 
 
-def test_probe_cases_differ_in_one_thing_each(section) -> None:
-    cases = probe_cases_of(section)
-    own, finer, other = cases.own, neighbour(cases, "mesh"), neighbour(cases, "grid")
-    assert "link" not in cases.neighbours
-    assert cases.coupled
-    assert changed(finer, {"mesh": own.mesh}) == own
-    assert changed(other, {"contact.grid": own.contact.grid}) == own
-    assert (finer.mesh.flank_nodes[0] - 1, finer.mesh.size) == (2 * 11, 4.0)
-    assert other.contact.grid[0] == 2 * own.contact.grid[0]
-    assert cases.neighbours["grid"].share == pytest.approx(4.0 / 3.0)
+def on_grid(model: WearModel, *cells: int) -> WearModel:
+    return replace(model, contacts=replace(model.contacts, grid=cells))
+
+
+def test_probe_models_differ_in_one_thing_each(section) -> None:
+    probes = probes_of(section)
+    own, finer, other = probes.own, neighbour(probes, "mesh"), neighbour(probes, "grid")
+    assert "link" not in probes.neighbours
+    assert probes.coupled
+    assert replace(finer, structure=replace(finer.structure, mesh=own.structure.mesh)) == own
+    assert on_grid(other, *own.contacts.grid) == own
+    mesh = finer.structure.mesh
+    assert (mesh.flank_nodes[0] - 1, mesh.size, mesh.order) == (2 * 11, 4.0, 2)
+    assert other.contacts.grid[0] == 2 * own.contacts.grid[0]
+    assert probes.neighbours["grid"].share == pytest.approx(4.0 / 3.0)
 
 
 def test_few_strips_are_compared_with_those_of_a_probe_run(section) -> None:
     """At second order, 24 cells are off by 64² / (64² - 24²) of their difference from 64."""
-    few = probe_cases_of(changed(section, {"contact.grid": (24, 24)}))
-    assert few.own.contact.grid == (64, 24)
-    assert neighbour(few, "grid").contact.grid == (24, 24)
+    few = probes_of(on_grid(section, 24, 24))
+    assert few.own.contacts.grid == (64, 24)
+    assert neighbour(few, "grid").contacts.grid == (24, 24)
     assert few.neighbours["grid"].share == pytest.approx(-1.0 / (1.0 - (24 / 64) ** 2))
-    many = probe_cases_of(changed(section, {"contact.grid": (256, 24)}))
-    assert many.own.contact.grid == (64, 24)
-    assert neighbour(many, "grid").contact.grid == (128, 24)
+    many = probes_of(on_grid(section, 256, 24))
+    assert many.own.contacts.grid == (64, 24)
+    assert neighbour(many, "grid").contacts.grid == (128, 24)
     assert many.neighbours["grid"].share == pytest.approx(4.0 / 3.0 / 4**2)
 
 
 def test_a_joint_in_space_is_judged_by_its_section() -> None:
-    case = load_case(CASES / "dovetail.yaml")
-    cases = probe_cases_of(case)
-    assert not cases.same
-    assert cases.own.structure.dimension == neighbour(cases, "mesh").structure.dimension == 2
-    assert cases.own.mesh == case.mesh
+    model = wear_model(load_case(CASES / "dovetail.yaml"))
+    probes = probes_of(model)
+    assert not probes.same
+    assert probes.own.structure.dimension == neighbour(probes, "mesh").structure.dimension == 2
+    assert probes.own.structure.mesh == model.structure.mesh
 
 
 def test_a_probe_run_that_fails_leaves_its_own_part_unknown(section, monkeypatch) -> None:
@@ -296,16 +317,16 @@ def test_a_probe_run_that_fails_leaves_its_own_part_unknown(section, monkeypatch
         def __init__(self) -> None:
             self.worn_and_pressed: Numbers = {"flank": {"depth": float(len(begun))}}
 
-    def run_of(case, source, kind="constant", first=None):
-        if case == failing:
+    def run_of(model, source, kind="constant", first=None):
+        if model == failing:
             raise MeshError("no such mesh")
-        begun.append((case, kind, first))
+        begun.append((model, kind, first))
         return Run()
 
-    monkeypatch.setattr(probe_cases, "probe_run", run_of)
-    cases = probe_cases_of(section)
+    monkeypatch.setattr(probe_models, "probe_run", run_of)
+    cases = probes_of(section)
     failing = neighbour(cases, "mesh")
-    probed = cases.probed(None, lambda case: None)
+    probed = cases.probed(None, lambda model: None)
     coupling = scaled(probed.errors["coupling"]["flank"], late(probed.rate, np.ones(1)))
     assert probed.failures == {"mesh": "no such mesh"}
     # That of the case wears 1, under unworn loads 2, and so on twice as many strips 3.
@@ -316,21 +337,21 @@ def test_a_probe_run_that_fails_leaves_its_own_part_unknown(section, monkeypatch
     assert begun[1][2] is not None
 
     failing = cases.own
-    probed = cases.probed(None, lambda case: None)
+    probed = cases.probed(None, lambda model: None)
     assert not probed.errors
     assert probed.failures == {"mesh, grid and coupling": "no such mesh"}
 
 
-def deepest(case, source, kind="constant") -> float:
+def deepest(model, source, kind="constant") -> float:
     """Return the largest depth of the first flank in a probe run."""
-    end = probe_run(case, source, kind).states[-1]
+    end = probe_run(model, source, kind).states[-1]
     return float(end.interfaces[0].surfaces.depth.max())
 
 
 @pytest.mark.slow
 def test_probe_runs_show_what_loads_that_follow_change(section, monkeypatch) -> None:
     """The references are probe runs with four times as many steps, with and without updates."""
-    cases, source = probe_cases_of(section), loads_of(section)
+    cases, source = probes_of(section), loads_of(section)
     probed = replace(cases, neighbours={}).probed(source, lambda _: source)
     assert not probed.failures
     monkeypatch.setattr(probe_runs, "STEPS", 4 * STEPS)
@@ -346,9 +367,8 @@ def test_probe_runs_show_what_loads_that_follow_change(section, monkeypatch) -> 
 )
 def test_loads_are_those_of_the_last_solution(resultants, shares) -> None:
     state = SimpleNamespace(cycles=np.array([0.0, 1e3, 4e3, 1e4]), drift=np.array([0, 1, 3, 2.0]))
-    coupling = SimpleNamespace(resultants=resultants, drift=2.0)
-    outcome = SimpleNamespace(state=state, case=SimpleNamespace(recoupling=coupling))
-    np.testing.assert_allclose(finding.followed(outcome), shares, rtol=1e-12)
+    wear = Wear(cycles=1e4, resultants=resultants, drift=2.0)
+    np.testing.assert_allclose(followed(wear, state), shares, rtol=1e-12)
 
 
 @pytest.mark.parametrize("rest", [0.5, 1.5, 2.5])
@@ -371,15 +391,16 @@ def test_the_error_of_loads_that_follow_late_is_found(rest) -> None:
 @pytest.mark.slow
 def test_probe_runs_show_the_error_due_to_the_mesh(section) -> None:
     """Meshes of two orders and sizes are compared with one of negligible error."""
-    cases = probe_cases_of(section)
+    cases = probes_of(section)
     probed = cases.probed(loads_of(section), loads_of)
     assert not probed.failures
     errors = probed.errors["mesh"]["intrados"]
 
-    fine = {"mesh.flank_nodes": (61, 61), "mesh.size": 1.5, "mesh.order": 2}
-    truth = changed(cases.own, fine)
+    joint = cases.own.structure
+    fine = replace(joint.mesh, flank_nodes=(61, 61), size=1.5, order=2)
+    truth = replace(cases.own, structure=replace(joint, mesh=fine))
     own, exact = (
-        probe_run(case, loads_of(case), "every").worn["intrados"] for case in (cases.own, truth)
+        probe_run(model, loads_of(model), "every").worn["intrados"] for model in (cases.own, truth)
     )
     for name in ("depth", "volume"):
         true = abs(own[name] / exact[name] - 1.0)
@@ -388,13 +409,65 @@ def test_probe_runs_show_the_error_due_to_the_mesh(section) -> None:
 
 def test_grids_are_compared_by_their_order() -> None:
     """For a body without a structure, the sphere's scar is computed on half as many cells."""
-    case = load_case(CASES / "sphere_wear.yaml")
-    cases = probe_cases_of(case)
-    coarser = case.contact.grid[0] / cases.own.contact.grid[0]
+    model = wear_model(load_case(CASES / "sphere_wear.yaml"))
+    cases = probes_of(model)
+    coarser = model.contacts.grid[0] / cases.own.contacts.grid[0]
     assert cases.neighbours["grid"].share == pytest.approx(-1.0 / 3.0 / coarser**2)
-    assert cases.own.contact.grid[0] == 2 * neighbour(cases, "grid").contact.grid[0]
+    assert cases.own.contacts.grid[0] == 2 * neighbour(cases, "grid").contacts.grid[0]
     assert cases.neighbours.keys() == {"grid"}
     assert not cases.coupled
+
+
+# --- models in Python ---------------------------------------------------------------------------
+
+
+def test_the_budget_of_a_model_is_that_of_the_run_of_its_case(tmp_path) -> None:
+    """A run stores its states, and solves contacts and probe runs in processes of their own."""
+    short = "wear.cycles=2e4", "wear.step={kind: implicit, cycles: 1e4}"
+    case, overrides = CASES / "dovetail_2d.yaml", (*COARSE_SECTION, *short)
+    summary = _summary_of(case, tmp_path / "out", *QUIET, *overrides)
+    budget = error_budget(wear_model(load_case(case, [*QUIET, *overrides])))
+    assert not budget.failures
+    assert set(budget.contacts) == {"intrados", "extrados"}
+    for name, errors in budget.contacts.items():
+        of_run = summary[name]["error"]
+        assert errors.keys() == of_run.keys() - {"notch_stress"}
+        for result, error in errors.items():
+            assert error.numbers == pytest.approx(of_run[result], rel=1e-9, abs=1e-12)
+            assert error.parts["mesh"] is not None
+    assert str(budget).count("unknown") == 0
+
+
+def test_what_no_probe_run_judges_is_unknown() -> None:
+    """The mesh behind given loads is unknown, and bodies without one have no such error."""
+    zero = np.zeros(2)
+    face = ContactFace.nominal("pad", (0.8, 1.0), lambda x, y: x**2 / 20.0, line=True)
+    forces = LoadHistory([50.0, 50.0], [20.0, -20.0], *[zero] * 6, sliding=zero > 0.0)
+    steel, law = Material(210e3, 0.3), EnergyLaw(1e-8)
+    contact = Contact((48, 1), (steel, steel), (law, law), 0.6, method="full")
+    model = WearModel(GivenLoads([(face, forces)]), contact, Wear(cycles=1e3))
+    budget = error_budget(model)
+    depth = budget.contacts["pad"]["depth"]
+    assert depth.parts["mesh"] is None
+    assert "mesh" in depth.unknown
+    assert "coupling" not in depth.parts
+    assert depth.parts["solver"] == 0.5 * contact.tolerance
+    assert "unknown" in str(budget)
+
+
+def test_the_budget_of_a_run_that_has_ended_needs_no_further_wear() -> None:
+    steel, law = Material(210e3, 0.3), EnergyLaw(1e-8)
+    bodies = BodyPair(lambda x, y: x**2 / 20.0, (0.8, 1.0), LoadTable.stroke(50.0, 0.02), line=True)
+    model = WearModel(bodies, Contact((48, 1), (steel, steel), (law, law), 0.6), Wear(cycles=1e3))
+
+    class Last(Observer):
+        def jump_finished(self, before, after) -> None:
+            self.state = after
+
+    first, further = Last(), Last()
+    budget = error_budget(model, [first])
+    assert error_budget(model, [further], first.state).contacts == budget.contacts
+    assert not hasattr(further, "state")
 
 
 # --- wear that has stopped ------------------------------------------------------------------------

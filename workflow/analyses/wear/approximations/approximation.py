@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from workflow.case.sections import Case
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.budget.parts import ContactErrors, ErrorByResult
     from workflow.analyses.wear.choice import Decision
 
 Settings = Mapping[str, Any]
@@ -37,29 +36,11 @@ class Rung:
 
 
 @dataclass(frozen=True)
-class Neighbour:
-    """A finer or coarser setting; the error of the case is ``share`` times their difference.
+class Remedy:
+    """The ``setting`` that reduces a ``part`` of the error budget."""
 
-    The difference is relative to the finer of both: a ``share`` below 0 means that this is the
-    coarser one.
-    """
-
-    settings: Settings
-    share: float = 1.0
-
-
-@dataclass(frozen=True)
-class BudgetPart:
-    """Part of the error budget of a run that an approximation causes.
-
-    ``errors`` returns the errors by result of a contact, or None where the approximation does not
-    apply; those of the ``signed`` results have a known sign. ``remedy`` is what reduces them.
-    """
-
-    name: str
-    errors: Callable[[ContactErrors], ErrorByResult | None]
-    remedy: str
-    signed: tuple[str, ...] = ()
+    part: str
+    setting: str
 
 
 @dataclass(frozen=True)
@@ -86,8 +67,8 @@ class Approximation:
     decide
         Chooses the cheapest setting of a dovetail, given the case with earlier decisions and the
         error that the setting may cause; None if ``fidelity: auto`` keeps the setting.
-    part
-        Its part of the error budget, if the budget has one.
+    remedy
+        What reduces its part of the error budget, if the budget has one.
     """
 
     name: str
@@ -99,7 +80,7 @@ class Approximation:
     moves_states: bool = False
     sections: bool = False
     decide: Callable[[Any, float], Decision] | None = None
-    part: BudgetPart | None = None
+    remedy: Remedy | None = None
 
     def rungs(self, case: Case) -> Iterator[Rung]:
         """Return the settings of a case from coarse to fine, none if it lacks the entries."""

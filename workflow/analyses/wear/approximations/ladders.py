@@ -13,9 +13,6 @@ from workflow.analyses.contact.case import HEIGHTS
 from workflow.analyses.wear.approximations.approximation import Rung, Settings, entry_at
 from workflow.case.sections import Case
 
-# Highest orders of convergence of depth and volume that estimates assume. The square-root end of a
-# pressure keeps a grid from second order.
-GRID_ORDER = MESH_ORDER = INCREMENTS_ORDER = 2.0
 # Refinements of a contact grid along each direction. A grid twice as fine takes four times as long
 # in 3-D, once for every increment of every jump where the contact wears.
 CONTACT_GRIDS = 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0
@@ -186,8 +183,8 @@ def _refined(case: Case, factors: Sequence[float]) -> Iterator[Rung]:
 
 def flank_mesh(case: Any, factor: float) -> dict[str, Any]:
     """Return the mesh of a dovetail with elements that are finer by ``factor``."""
-    counts = tuple(max(3, 1 + round(factor * (count - 1))) for count in case.mesh.flank_nodes)
-    return {"mesh.flank_nodes": counts, **_elements(case, factor)}
+    refined = case.mesh.described().refined(factor)
+    return {"mesh.flank_nodes": refined.flank_nodes, "mesh.size": refined.size}
 
 
 def _elements(case: Any, factor: float) -> dict[str, Any]:

@@ -7,32 +7,26 @@ its warnings read this list.
 from __future__ import annotations
 
 from workflow.analyses.wear.approximations import ladders
-from workflow.analyses.wear.approximations.approximation import Approximation, BudgetPart
-from workflow.analyses.wear.budget.parts import ContactErrors
+from workflow.analyses.wear.approximations.approximation import Approximation, Remedy
 from workflow.analyses.wear.fidelity import decisions
-
-# Results whose error has a known sign. Steps and increments make some places of a surface too deep
-# and others too shallow, and nothing is known of the sign at worn edges.
-VOLUME = ("volume",)
-WEAR = "depth", *VOLUME
-WEAR_AND_PEAK = *WEAR, "peak_pressure"
+from workflow.models.budget import convergence
 
 # Friction along a path of increments is of first order, and so is a residual in its tolerance.
 APPROXIMATIONS = (
     Approximation(
         *("grid", "cells of the contact grid", ladders.grids),
         entries=("contact.grid",),
-        order=ladders.GRID_ORDER,
+        order=convergence.GRID_ORDER,
         closed_form=True,
         decide=decisions.choose_grid,
-        part=BudgetPart("grid", ContactErrors.grid, "contact.grid", WEAR_AND_PEAK),
+        remedy=Remedy("grid", "contact.grid"),
     ),
     Approximation(
         *("tolerance", "tolerance of the contact solver", ladders.tolerances),
         entries=("contact.tolerance",),
         order=1.0,
         decide=decisions.choose_tolerance,
-        part=BudgetPart("solver", ContactErrors.solver, "contact.tolerance"),
+        remedy=Remedy("solver", "contact.tolerance"),
     ),
     Approximation(
         "method", "slip of the structure or of the half-space", ladders.methods, ("contact.method",)
@@ -42,7 +36,7 @@ APPROXIMATIONS = (
         entries=("wear.step.kind",),
         order=2.0,
         decide=decisions.choose_steps,
-        part=BudgetPart("steps", ContactErrors.steps, "wear.step"),
+        remedy=Remedy("steps", "wear.step"),
     ),
     Approximation(
         *("dimension", "two dimensions or three", ladders.dimensions, ("structure.dimension",)),
@@ -53,7 +47,7 @@ APPROXIMATIONS = (
         *("coupling", "how often worn surfaces go back to the structure", ladders.couplings),
         entries=("coupling.drift",),
         decide=decisions.choose_drift,
-        part=BudgetPart("coupling", ContactErrors.coupling, "coupling.resultants", WEAR),
+        remedy=Remedy("coupling", "coupling.resultants"),
     ),
     Approximation(
         *("history", "increments of the load path", ladders.histories, ("contact.history",)),
@@ -63,22 +57,22 @@ APPROXIMATIONS = (
     Approximation(
         *("increments", "increments of a cycle", ladders.increments),
         entries=("load_path.increments",),
-        order=ladders.INCREMENTS_ORDER,
+        order=convergence.INCREMENTS_ORDER,
         decide=decisions.choose_increments,
-        part=BudgetPart("increments", ContactErrors.increments, "load_path.increments", VOLUME),
+        remedy=Remedy("increments", "load_path.increments"),
     ),
     Approximation(
         *("link", "half-spaces, or corrected by the structure's nodes", ladders.links),
         entries=("contact.link",),
-        order=ladders.MESH_ORDER,
-        part=BudgetPart("link", ContactErrors.link, "the mesh of the contact faces", WEAR),
+        order=convergence.MESH_ORDER,
+        remedy=Remedy("link", "the mesh of the contact faces"),
     ),
     Approximation(
         *("mesh", "finite elements of the structure", ladders.meshes),
         entries=("mesh.flank_nodes", "mesh.pad_elements", "mesh.size"),
-        order=ladders.MESH_ORDER,
+        order=convergence.MESH_ORDER,
         decide=decisions.choose_mesh,
-        part=BudgetPart("mesh", ContactErrors.mesh, "the mesh of the structure", WEAR_AND_PEAK),
+        remedy=Remedy("mesh", "the mesh of the structure"),
     ),
     Approximation("order", "order of the finite elements", ladders.orders, ("mesh.order",)),
     Approximation(
@@ -88,5 +82,7 @@ APPROXIMATIONS = (
     ),
 )
 
-PARTS = {known.part.name: known.part for known in APPROXIMATIONS if known.part is not None}
-"""Parts of the error budget by name."""
+REMEDIES = {
+    known.remedy.part: known.remedy.setting for known in APPROXIMATIONS if known.remedy is not None
+}
+"""What reduces each part of the error budget, where the case does not say more."""

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.analyses.wear.budget.parts import ResultError
-from workflow.analyses.wear.output.layout import PARTS, RESULTS
+from workflow.analyses.wear.output.layout import RESULTS
 from workflow.case.text.readable import percent
+from workflow.models.budget.names import PARTS
+from workflow.models.budget.parts import ResultError
 
 Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
 
@@ -23,7 +24,7 @@ MOST_PARTS, WORTH_REPORTING = 2, 0.1
 
 def summary_of(errors: Mapping[str, ResultError]) -> dict[str, Any]:
     """Return the parts of each result and their ``total``; None for unknown ones."""
-    return {name: {**error.parts, "total": error.total} for name, error in errors.items()}
+    return {name: error.numbers for name, error in errors.items()}
 
 
 def arrays_of(errors: Mapping[str, ResultError]) -> dict[str, Array]:

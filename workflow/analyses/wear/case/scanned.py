@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
 from typing import TYPE_CHECKING, Any
@@ -52,6 +52,10 @@ class ScannedFace:
         assert self.face is not None
         # The nodes of the meshed part come first among those of the whole face.
         return self._fine.fitted(self.surfaces.gap(self._fine.grid))[: len(self.face)]
+
+    def at_nodes_of(self, face: Interface) -> Array:
+        """Return :meth:`at_nodes` for the face of another mesh."""
+        return replace(self, face=face).at_nodes()
 
     @property
     def over(self) -> GapFunction:

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from wear.steps.step_errors import root_mean_square
-from workflow.analyses.wear.approximations.registry import PARTS
+from workflow.analyses.wear.approximations.registry import REMEDIES
 from workflow.analyses.wear.budget.report import Budget, warning_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Duration
-from workflow.analyses.wear.output.outcome import InterfaceOutcome
 from workflow.analyses.wear.structures import structure_of
 from workflow.case.text.readable import percent
+from workflow.models.budget.outcome import InterfaceOutcome
 from workflow.shell.terminal.reporter import Reporter
 
 # Largest error of the peak pressure due to steps without a warning.
@@ -27,8 +27,6 @@ FEW_INCREMENTS = 32
 # fall to a quarter; the length of automatic steps is about proportional to the root of their
 # tolerance.
 SHORTER, STRICTER = 4.0, 10.0
-# What reduces each part of the error, where the case does not say more.
-REMEDIES = {part.name: part.remedy for part in PARTS.values()}
 
 
 def warn_of_errors(

@@ -11,12 +11,12 @@ import time
 from typing import Any
 
 from workflow.analyses.wear.approximations.approximation import Approximation, entry_at
-from workflow.analyses.wear.approximations.probe_runs import FAILURES
 from workflow.analyses.wear.approximations.registry import APPROXIMATIONS
 from workflow.analyses.wear.choice import Decision, record_of
-from workflow.analyses.wear.fidelity.probe import LEGS
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.case.changing import changed
+from workflow.models.budget.probe_runs import FAILURES
+from workflow.models.dovetail import FEW_INCREMENTS
 
 # Largest share of the accuracy that two dimensions may use: other approximations need the rest.
 MOST_FOR_DIMENSION = 0.9
@@ -38,7 +38,7 @@ def choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any]]:
     """Return the case to run, and a record of the choices and their reasons."""
     begin = time.perf_counter()
     if not any(case.legs):
-        case = changed(case, case.divided(LEGS))  # until the increments are decided
+        case = changed(case, case.divided(FEW_INCREMENTS))  # until the increments are decided
     by_name = {approximation.name: approximation for approximation in APPROXIMATIONS}
     decisions = [_decide(by_name["dimension"], case, MOST_FOR_DIMENSION * case.accuracy)]
     case = changed(case, decisions[0].chosen)

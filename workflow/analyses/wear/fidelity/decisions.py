@@ -15,9 +15,6 @@ from fe_models.meshes.structure_mesh import MeshError
 from fe_models.meshes.transfer import FaceTransfer
 from workflow.analyses.wear.approximations import ladders
 from workflow.analyses.wear.approximations.approximation import Settings
-from workflow.analyses.wear.approximations.convergence import richardson
-from workflow.analyses.wear.approximations.probe_runs import STEPS, Numbers, scales
-from workflow.analyses.wear.budget.parts import ERROR_PER_TOLERANCE
 from workflow.analyses.wear.case.sections import SIZES
 from workflow.analyses.wear.checks.uniformity import sections
 from workflow.analyses.wear.choice import Decision
@@ -35,6 +32,9 @@ from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
 from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
+from workflow.models.budget.convergence import GRID_ORDER, MESH_ORDER, richardson
+from workflow.models.budget.parts import ERROR_PER_TOLERANCE
+from workflow.models.budget.probe_runs import STEPS, Numbers, scales
 
 # Mesh on which two and three dimensions are compared: nodes across a flank, and rows along it per
 # width of the flank. On the default joint, meshes from 6 x 16 to 20 x 34 nodes agree on the
@@ -143,7 +143,7 @@ def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
     def worn(elements: int) -> Numbers:
         return section_wear(changed(section, settings(elements)))
 
-    order = ladders.MESH_ORDER
+    order = MESH_ORDER
     return _climb("elements across the flank", numbers, most, settings, worn, allowed, order)
 
 
@@ -155,9 +155,7 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
 
     def climb(unit: str, cells: int, most: int, worn: Callable[[int], Numbers]) -> Decision:
         numbers = _doublings(cells, max(ladders.FEWEST_CELLS, cells // COARSER), most)
-        return _climb(
-            unit, numbers, most, lambda number: {unit: number}, worn, part, ladders.GRID_ORDER
-        )
+        return _climb(unit, numbers, most, lambda number: {unit: number}, worn, part, GRID_ORDER)
 
     def worn(cells: int) -> Numbers:
         return section_wear(changed(section, {"contact.grid": (cells, cells)}))

@@ -7,7 +7,9 @@ a few per cent of the depth, is nearly the same in all of them and cancels in di
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -18,41 +20,56 @@ from wear.contact.tractions import acting_slip
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.marching import advance_cycles
 from wear.steps.stepping import SlidingCycle, WearingContact, WearState
-from workflow.analyses.wear.approximations.probe_runs import (
+from workflow.analyses.wear.case.sections import ContactSection, ContactStress, Life, Step
+from workflow.analyses.wear.structures.dovetail.case import SIDES, DovetailCase
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
+from workflow.analyses.wear.translation import model_with, structure_loads
+from workflow.case.changing import changed
+from workflow.errors import MethodFailed
+from workflow.models.budget.probe_runs import (
     STEPS,
     TOLERANCE,
     Numbers,
     probe_run,
-    shortened,
 )
-from workflow.analyses.wear.case.sections import ContactSection
-from workflow.analyses.wear.structures.dovetail.case import SIDES, DovetailCase
-from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
-from workflow.analyses.wear.translation import structure_loads
-from workflow.case.changing import changed
-from workflow.errors import MethodFailed
+from workflow.models.dovetail import FEW_INCREMENTS
 from workflow.models.structure import StructureLoads
+from workflow.models.wear import WearModel
 
-# Settings of a probe run along the axes that it does not vary: cells across a flank, nodes across
-# it, and increments up to the peak and after it. Differences along one axis hardly depend on them.
-STRIPS, NODES, LEGS = 64, 10, (4, 7)
+# Settings of a probe run along the axes that it does not vary: cells across a flank, and nodes
+# across it. Differences along one axis hardly depend on them.
+CELLS, NODES = 64, 10
 # Elements round a fillet, whose stress no probe run needs.
 NOTCH = 16
 
 
+def _shortened(case: DovetailCase, settings: Mapping[str, Any]) -> DovetailCase:
+    """Return the case of a probe run, with other ``settings`` by their dotted paths."""
+    step = Step.model_construct(kind="implicit", cycles=case.wear.cycles / STEPS)
+    return changed(
+        case,
+        {
+            "contact.tolerance": TOLERANCE,
+            "wear.step": step,
+            "stress": ContactStress(section="none", life=Life(parameter="none")),
+            **settings,
+        },
+    )
+
+
 def plane_section(case: DovetailCase) -> DovetailCase:
     """Return the plane-strain section of a case for probe runs; the structure gives the slips."""
-    return shortened(
+    return _shortened(
         case,
         {
             **case.to_plane,
             "mesh.flank_nodes": (NODES, NODES),
             "mesh.notch": NOTCH,
             "mesh.size": case.structure.face_width / 2.0,
-            "contact.grid": (STRIPS, STRIPS),
+            "contact.grid": (CELLS, CELLS),
             "contact.method": "normal",
             "wear.motion": "neglect",
-            **case.divided(LEGS),
+            **case.divided(FEW_INCREMENTS),
         },
     )
 
@@ -67,13 +84,17 @@ def _last_structure(case: DovetailCase) -> StructureLoads:
     return structure_loads(case, dovetail_joint)
 
 
+def _model(case: DovetailCase) -> WearModel:
+    return model_with(case, dovetail_joint(case))
+
+
 def section_wear(case: DovetailCase) -> Numbers:
     """Return the depth [mm] and the volume per length [mm²] worn from both bodies, by flank.
 
     The loads are those of the unworn structure. Raises the errors of structure and contact, and
     MethodFailed where nothing wears.
     """
-    return _wearing(probe_run(case, _structure(case)).worn)
+    return _wearing(probe_run(_model(case), _structure(case)).worn)
 
 
 def coupled_wear(case: DovetailCase) -> tuple[Numbers, float]:
@@ -82,7 +103,7 @@ def coupled_wear(case: DovetailCase) -> tuple[Numbers, float]:
     The drift is that of the resultants at the end, as a run measures it.
     """
     structure = _structure(case)
-    probed = probe_run(case, structure, "every")
+    probed = probe_run(_model(case), structure, "every")
     sizes = np.array([contact.grid.size for contact in probed.contacts])
     drifted = structure.probe(probed.nodal_depths)
     drift = resultant_change(drifted, probed.states[0].solved_resultants, sizes)

@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.wear.output.layout import PARTS, RESULTS, WearContents
+from workflow.analyses.wear.output.layout import RESULTS, WearContents
+from workflow.models.budget.names import PARTS
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
 

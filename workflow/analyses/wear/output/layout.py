@@ -7,18 +7,12 @@ from dataclasses import dataclass
 from workflow.analyses.contact.output.layout import LOAD_HISTORY, ON_GRID, TRACTIONS
 from workflow.analyses.wear.output.loop_table import OVER_ENERGY
 from workflow.layout.declared import GRID, Layout
+from workflow.models.budget.names import PARTS, PRESSURES, WORN
 from workflow.models.stress.layout import BODY, LIFE, SECTION, SECTION_AXES
 
 # Ratio of the cycles to which kinetics are extrapolated to the computed cycles.
 EXTRAPOLATION = 2.0
-# Sources of error, in the order of their datasets.
-PARTS = ("link", "mesh", "increments", "grid", "steps", "coupling", "solver")
 # Results with estimated errors, by name and in words: wear, pressures, and others.
-WORN = {"depth": "depth", "volume": "volume"}
-PRESSURES = {
-    "peak_pressure": "unworn peak pressure",
-    "worn_peak_pressure": "worn peak pressure",
-}
 RESULTS = WORN | PRESSURES | {"life": "fretting parameter", "notch_stress": "notch stress"}
 # Group of the face of body 1, below that of the contact, which is the face of body 2.
 OTHER_FACE = "face_1"

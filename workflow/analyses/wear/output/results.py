@@ -36,7 +36,7 @@ from workflow.analyses.wear.output.layout import (
     energy_name,
 )
 from workflow.analyses.wear.output.link_report import link_summary
-from workflow.analyses.wear.output.outcome import STOPPED, InterfaceOutcome, Outcome
+from workflow.analyses.wear.output.outcome import Outcome
 from workflow.analyses.wear.worn.contact_loops import (
     Measurements,
     loops_sentence,
@@ -53,6 +53,7 @@ from workflow.analyses.wear.worn.worn_structure import (
 )
 from workflow.case.text.plain import shares
 from workflow.layout.declared import Arrays
+from workflow.models.budget.outcome import STOPPED, InterfaceOutcome
 from workflow.models.stress.contact_stress import InterfaceStress, contact_stresses, cycles_of
 from workflow.models.structure import StructureLoads
 from workflow.shell.analysis import Run

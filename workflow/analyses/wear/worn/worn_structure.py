@@ -18,7 +18,6 @@ from fe_models.meshes.structure_mesh import Body, Interface, StructureMesh, writ
 from sa_solver.half_space.stress import von_mises
 from sa_solver.types import LoadHistory, Tally
 from wear.coupled_state import CoupledState
-from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.budget.report import arrays_of, summary_of
 from workflow.analyses.wear.output.datasets import put_face
 from workflow.analyses.wear.recording import reported_stage
@@ -26,6 +25,7 @@ from workflow.analyses.wear.structures.resultants.writing import put_closure
 from workflow.analyses.wear.worn.bolts import BoltTensions
 from workflow.case.text.readable import percent
 from workflow.layout.declared import Arrays
+from workflow.models.budget.parts import ResultError
 from workflow.models.contact import WornFaces
 from workflow.models.stress.structure_stress import (
     StressedStructure,

@@ -16,8 +16,6 @@ from workflow.analyses.wear.structures.bodies.case import (
 from workflow.models.uncoupled.load_table import SHIFTS
 
 if TYPE_CHECKING:
-    from wear.contact.interface import InterfaceState
-    from wear.contact.tractions import CycleTractions
     from workflow.models.uncoupled.body_pair import BodyPair
 
 # Slip path in a cycle of a contact under shear forces, for the estimate of run times [mm].
@@ -53,14 +51,6 @@ def _choose(
     return choose_parts(case)
 
 
-def _finer_cycles(case: TwoBodiesWearCase, state: InterfaceState) -> list[CycleTractions] | None:
-    if case.contact.method != "full":
-        return None
-    from workflow.analyses.wear.structures.bodies.increments import finer_cycles
-
-    return finer_cycles(case, state)
-
-
 STRUCTURE, LINE_STRUCTURE = (
     WearStructure(
         name=name,
@@ -68,7 +58,6 @@ STRUCTURE, LINE_STRUCTURE = (
         model=_model,
         extent=_extent,
         choose=_choose,
-        finer_cycles=_finer_cycles,
         settings=lambda _: {"increments": "contact.accuracy, or the increments of load_path"},
     )
     for name, case in (("bodies_wear", BodiesWearCase), ("line_wear", LineBodiesWearCase))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,8 +18,7 @@ from sa_solver.cycles.history import MOST_INCREMENTS, NO_ENERGY
 from sa_solver.cycles.increments import depth_and_energy
 from sa_solver.rigid_modes import PLANAR
 from sa_solver.types import Array
-from wear.contact.interface import InterfaceContact, InterfaceState
-from wear.contact.tractions import CycleTractions
+from wear.contact.interface import InterfaceContact
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.contact.load_path import Leg, LineLeg
 from workflow.analyses.wear.choice import Decision, record_of
@@ -65,17 +63,6 @@ def choose_parts(case: AnyCase) -> tuple[AnyCase, dict[str, Any] | None]:
     }
     decision = Decision(_divided(case, parts), why, accuracy, error, probe)
     return changed(case, decision.chosen), record_of([decision.timed(begin)], accuracy, begin)
-
-
-def finer_cycles(case: TwoBodiesWearCase, state: InterfaceState) -> list[CycleTractions]:
-    """Return the unworn cycle and that on the surfaces of ``state``, in twice as many increments.
-
-    Raises ContactFailure.
-    """
-    contact, loads = _contact(case, 2)
-    unworn, first = contact.begin(loads, case.wear.cycles)
-    worn = replace(unworn, surfaces=state.surfaces, energy=state.energy, starts={}, start=None)
-    return [contact.unworn_tractions(loads, first), contact.tractions(worn)]
 
 
 def _contact(case: TwoBodiesWearCase, parts: int) -> tuple[InterfaceContact, Any]:

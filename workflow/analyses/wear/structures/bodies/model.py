@@ -17,15 +17,15 @@ from workflow.models.gaps import GapFunction, GridHeights
 from workflow.models.uncoupled.body_pair import BodyPair, BodyPairSource
 
 
-def body_pair(case: TwoBodiesWearCase, parts: int = 1) -> BodyPair:
-    """Return the bodies of a case, with every increment split into ``parts``."""
+def body_pair(case: TwoBodiesWearCase) -> BodyPair:
+    """Return the bodies of a case."""
     path, peak = case.load_path, None
     if isinstance(path, Reciprocation | LineReciprocation):
-        peak = parts * path.increments // 2  # mid-stroke, on the way there
+        peak = path.increments // 2  # mid-stroke, on the way there
     return BodyPair(
         gap=gap_of(case.structure, case.grid),
         size=case.size,
-        loads=path.table().in_parts(parts),
+        loads=path.table(),
         tilt=path.tilt,
         line=case.line,
         name=NAME,
@@ -36,7 +36,7 @@ def body_pair(case: TwoBodiesWearCase, parts: int = 1) -> BodyPair:
 
 def source_of(case: TwoBodiesWearCase, parts: int = 1) -> BodyPairSource:
     """Return the loads of the bodies of a case, with every increment split into ``parts``."""
-    return body_pair(case, parts).source(contact_of(case, NAME))
+    return body_pair(case).in_parts(parts).source(contact_of(case, NAME))
 
 
 def gap_of(bodies: Shape | Heights, grid: Grid) -> GapFunction:

@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from math import pi, prod
 from typing import TYPE_CHECKING, Any
 
-from workflow.analyses.wear.approximations.approximation import Neighbour
-from workflow.analyses.wear.approximations.ladders import MESH_ORDER, flank_mesh
+from workflow.analyses.wear.approximations.ladders import flank_mesh
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
 from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.case.changing import changed
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
@@ -80,25 +78,6 @@ def _warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[s
     return warnings(case, stage, load)
 
 
-def _section(case: DovetailCase) -> DovetailCase:
-    """Return the section on the mesh of the case; the error along the slot is not included."""
-    from workflow.analyses.wear.fidelity.probe import plane_section
-
-    return changed(plane_section(case), {"mesh": case.mesh})
-
-
-def _finer(case: DovetailCase) -> Neighbour:
-    """Return a mesh of half the size and second order.
-
-    The difference is all of the error of a mesh of first order, and is extrapolated for one of
-    second order.
-    """
-    from workflow.analyses.wear.approximations.convergence import share_of_difference
-
-    share = 1.0 if case.mesh.order == 1 else share_of_difference(2.0, MESH_ORDER)
-    return Neighbour({**flank_mesh(case, 2.0), "mesh.order": 2}, share)
-
-
 def _settings(case: DovetailCase) -> dict[str, str]:
     """Return the settings that reduce the errors of mesh and link: elements of half the size."""
     mesh = flank_mesh(case, 2.0)
@@ -115,7 +94,5 @@ STRUCTURE = WearStructure(
     memory=_memory,
     choose=_choose,
     warnings=_warnings,
-    section=_section,
-    finer=_finer,
     settings=_settings,
 )

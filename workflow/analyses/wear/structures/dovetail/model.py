@@ -40,4 +40,4 @@ def section_joint(case: DovetailCase) -> DovetailJoint:
 
 def added_gap(face: ScannedFace) -> AddedGap:
     """Return the gap of measured surfaces: their values on cells, their means at nodes."""
-    return AddedGap(face.over, face.at_nodes)
+    return AddedGap(face.over, face.at_nodes_of)

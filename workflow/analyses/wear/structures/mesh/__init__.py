@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from workflow.analyses.wear.approximations.approximation import Neighbour
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
 from workflow.analyses.wear.structure import (
     DENSE_MATRICES,
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 # Number of dense interface matrices held while more than two bodies are joined: 9.6 for a stack of
 # 12 blocks.
 OF_MANY = 10
-# Largest number of nodes in space for cheap second-order elements, which have seven times as many.
-MOST_NODES = 4000
 
 
 def _model(case: MeshCase) -> StructureModel:
@@ -42,13 +39,6 @@ def _extent(case: MeshCase) -> Extent:
         sum(len(interface) for interface in mesh.interfaces),
         dissipating=DISSIPATING,
     )
-
-
-def _finer(case: MeshCase) -> Neighbour | None:
-    """Return the mesh with second-order elements, if it has first-order ones and is small."""
-    mesh = case.structure.mesh(case.mesh.size)
-    cheap = mesh.interfaces[0].line or mesh.node_count(1) <= MOST_NODES
-    return Neighbour({"mesh.order": 2}) if case.mesh.order == 1 and cheap else None
 
 
 def _memory(case: MeshCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
@@ -85,6 +75,5 @@ STRUCTURE = WearStructure(
     extent=_extent,
     memory=_memory,
     choose=_choose,
-    finer=_finer,
     settings=_settings,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 from fe_models.meshes.structure_mesh import Interface
 from sa_solver.types import Array, Grid
@@ -61,7 +62,7 @@ def _added(case: MeshCase, interfaces: tuple[Interface, ...]) -> Iterator[tuple[
         elif shape is None:
             yield interface.name, added_gap(scan)
         else:
-            yield interface.name, _both(shape, scan, interface.coordinates)
+            yield interface.name, _both(shape, scan)
 
 
 def _shape(case: MeshCase, interface: Interface) -> AddedGap | None:
@@ -73,7 +74,11 @@ def _shape(case: MeshCase, interface: Interface) -> AddedGap | None:
     return AddedGap(gap_over(pair.gap, None, Grid.over(face_size(interface), grid, interface.line)))
 
 
-def _both(shape: AddedGap, scan: ScannedFace, coordinates: Array) -> AddedGap:
+def _both(shape: AddedGap, scan: ScannedFace) -> AddedGap:
     """Return the sum of a shape and of surfaces as measured."""
     measured = added_gap(scan)
-    return AddedGap(measured.on(shape.over), lambda: shape.at_nodes(coordinates) + scan.at_nodes())
+    return AddedGap(measured.on(shape.over), partial(_nodal_sum, shape, measured))
+
+
+def _nodal_sum(shape: AddedGap, measured: AddedGap, face: Interface) -> Array:
+    return shape.at_nodes(face) + measured.at_nodes(face)

@@ -1,34 +1,31 @@
-"""Probe cases of a wear case: cheap variants whose short runs differ in one setting each."""
+"""Probe models of a wear model: cheap variants whose short runs differ in one setting each."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import TYPE_CHECKING, Generic, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from sa_solver.types import Array, Progress, unseen
-from workflow.analyses.wear.approximations.approximation import Neighbour
-from workflow.analyses.wear.approximations.convergence import share_of_difference
-from workflow.analyses.wear.approximations.ladders import GRID_ORDER
-from workflow.analyses.wear.approximations.probe_runs import (
+from workflow.models.budget.convergence import GRID_ORDER, share_of_difference
+from workflow.models.budget.probe_runs import (
     STEPS,
+    TOLERANCE,
     UNCHECKED_FAILURES,
     Numbers,
     ProbeRun,
     probe_run,
-    shortened,
 )
-from workflow.analyses.wear.case.base import FiniteElementCase
-from workflow.analyses.wear.structure import AnyWearCase, WearStructure
-from workflow.case.changing import changed
+from workflow.models.contact import Contact
+from workflow.models.loads import LoadSource, UncoupledSource
+from workflow.models.structure_model import StructureModel
+from workflow.models.uncoupled.body_pair import BodyPair
+from workflow.models.wear import WearModel
 
-if TYPE_CHECKING:
-    from workflow.models.loads import LoadSource
-
-# Cells along a direction of the contact of a probe run: at most half of the case's, and no coarser
+# Cells along a direction of the contact of a probe run: at most half of the model's, and no coarser
 # grid has fewer than the least number. Line contacts use the largest number, since they are cheap.
 MOST_CELLS, FEWEST = 64, 8
 # Below this rate, loads that follow wear have hardly settled by the end of a probe run.
@@ -52,59 +49,75 @@ class Probed:
 
 
 @dataclass(frozen=True)
-class ProbeCases(Generic[AnyWearCase]):
-    """The case ``own`` that represents that of a run in probe runs, and its neighbours by part.
+class Neighbour:
+    """A finer or coarser model; the error of the model is ``share`` times their difference.
 
-    ``own`` has the ``same`` structure as the case of the run, or is a plane section. ``coupled``
-    says whether the loads come from a structure, so that they can follow wear. The error due to the
-    grid is multiplied by ``finer_cells`` for contacts with separate grids.
+    The difference is relative to the finer of both: a ``share`` below 0 means that this is the
+    coarser one.
     """
 
-    own: AnyWearCase
+    model: WearModel
+    share: float = 1.0
+
+
+@dataclass(frozen=True)
+class ProbeModels:
+    """The model ``own`` that represents that of a run in probe runs, and its neighbours by part.
+
+    ``own`` has the ``same`` structure as the model of the run, or is a plane section. ``coupled``
+    says whether the loads can follow wear. The error due to the grid is multiplied by
+    ``finer_cells`` for contacts with separate grids.
+    """
+
+    own: WearModel
     same: bool
     coupled: bool
     neighbours: Mapping[str, Neighbour]
     finer_cells: Mapping[str, float]
 
     @classmethod
-    def of(
-        cls, case: AnyWearCase, structure: WearStructure[AnyWearCase], line: bool
-    ) -> ProbeCases[AnyWearCase]:
-        """Return the probe cases of a case; ``line`` says whether it has line contacts."""
-        section, finer = structure.section(case), structure.finer(case)
-        line = line or section is not None
-        across, along = case.contact.grid
+    def of(cls, model: WearModel, source: LoadSource) -> ProbeModels:
+        """Return the probe models of a model whose loads are ``source``."""
+        structure, section, wear = _structure(model), None, model.wear
+        if structure is not None and (section := structure.section()) is not None:
+            structure, wear = section, replace(wear, motion="neglect")
+        line = source.line or section is not None
+        own_grids = _grids(model)
+        of_model = _shared_grid(own_grids)
+        across, along = of_model
         grid = (MOST_CELLS, along) if line else (_fewer(across), _fewer(along))
-        settings = {"contact.grid": grid, "contact.method": "normal"}
-        own = shortened((section or case).on_one_grid(), settings)
-        neighbours = {} if finer is None else {"mesh": finer}
-        if (other := _other_grid(grid, case.contact.grid, line)) is not None:
-            # The error of the case is smaller than that of the probe case by the last factor.
+        own = WearModel(structure or model.structure, model.contacts, wear)
+        own = _with(own, grid=grid, method="normal", tolerance=TOLERANCE)
+        neighbours = {}
+        if structure is not None and (finer := structure.finer_mesh()) is not None:
+            neighbours["mesh"] = Neighbour(replace(own, structure=finer.structure), finer.share)
+        if (other := _other_grid(grid, of_model, line)) is not None:
+            # The error of the model is smaller than that of the probe model by the last factor.
             refined, coarser = other[0] / grid[0], (grid[0] / across) ** GRID_ORDER
             share = share_of_difference(refined, GRID_ORDER) * coarser
-            neighbours["grid"] = Neighbour({"contact.grid": other}, share)
-        if own.contact.link != "corrected" and not case.half_spaces:
-            neighbours["link"] = Neighbour({"contact.link": "corrected"})
-        finer_cells = {
-            name: (across / case.terms(name).grid[0]) ** GRID_ORDER for name in case.contact_names
-        }
-        coupled = isinstance(case, FiniteElementCase)
+            neighbours["grid"] = Neighbour(_with(own, grid=other), share)
+        linked = all(contact.link == "corrected" for contact in _contacts(own).values())
+        if not linked and not isinstance(model.structure, BodyPair):
+            neighbours["link"] = Neighbour(_with(own, link="corrected"))
+        finer_cells = {name: (across / cells[0]) ** GRID_ORDER for name, cells in own_grids.items()}
+        coupled = not isinstance(source, UncoupledSource)
         return cls(own, section is None, coupled, neighbours, finer_cells)
 
     def probed(
         self,
         source: LoadSource | None,
-        source_of: Callable[[AnyWearCase], LoadSource],
+        source_of: Callable[[WearModel], LoadSource],
         progress: Progress = unseen,
     ) -> Probed:
         """Return the errors from all probe runs, without parts whose probe run fails.
 
-        ``source`` is that of the case itself, not needed where another structure replaces it.
+        ``source`` is that of the model itself, not needed where another structure replaces it.
         ``progress`` is called with the number of probe runs done, that of ``own`` first.
         """
         probed = Probed()
         # Where loads follow wear, the effect of the mesh on this counts as well.
-        kind: Resultants = "constant" if self.own.recoupling.resultants == "constant" else "every"
+        follows = self.coupled and self.own.wear.resultants != "constant"
+        kind: Resultants = "every" if follows else "constant"
         try:
             shared = source if source is not None and self.same else source_of(self.own)
             first = probe_run(self.own, shared, kind)
@@ -120,12 +133,11 @@ class ProbeCases(Generic[AnyWearCase]):
             if part == "coupling":
                 return _difference(own("constant"), own("every"), 1.0)
             neighbour = self.neighbours[part]
-            case = changed(self.own, neighbour.settings)
             if part == "mesh":
-                other = probe_run(case, source_of(case), kind)
+                other = probe_run(neighbour.model, source_of(neighbour.model), kind)
                 return _difference(first, other, neighbour.share)
             # Unworn loads suffice for effects of the contacts.
-            return _difference(own("constant"), probe_run(case, shared), neighbour.share)
+            return _difference(own("constant"), probe_run(neighbour.model, shared), neighbour.share)
 
         parts = [*self.neighbours, *(["coupling"] if self.coupled else [])]
         for done, part in enumerate(parts, 1):
@@ -165,14 +177,43 @@ def _settling_rate(run: ProbeRun) -> float:
 Cells = tuple[int, int]
 
 
-def _other_grid(own: Cells, of_case: Cells, line: bool) -> Cells | None:
+def _structure(model: WearModel) -> StructureModel | None:
+    """Return the structure of finite elements of a model, None where it has none."""
+    if hasattr(model.structure, "meshed"):
+        return cast("StructureModel", model.structure)
+    return None
+
+
+def _contacts(model: WearModel) -> Mapping[str, Contact]:
+    """Return the contacts by name; the only contact of all faces has an empty name."""
+    return {"": model.contacts} if isinstance(model.contacts, Contact) else model.contacts
+
+
+def _with(model: WearModel, **settings: Any) -> WearModel:
+    """Return the model with other settings of all its contacts."""
+    changed = {name: replace(contact, **settings) for name, contact in _contacts(model).items()}
+    return replace(model, contacts=changed[""] if isinstance(model.contacts, Contact) else changed)
+
+
+def _grids(model: WearModel) -> dict[str, Cells]:
+    """Return the cells of each contact by name."""
+    return {name: contact.grid for name, contact in _contacts(model).items()}
+
+
+def _shared_grid(grids: Mapping[str, Cells]) -> Cells:
+    """Return the grid of most contacts, and of the first of them where as many have another."""
+    cells = list(grids.values())
+    return max(cells, key=cells.count)
+
+
+def _other_grid(own: Cells, of_model: Cells, line: bool) -> Cells | None:
     """Return the grid to compare ``own`` with, or None if it would have too few cells.
 
-    Strips are those of the case if these are fewer and resolve edges less, else twice as many. In
+    Strips are those of the model if these are fewer and resolve edges less, else twice as many. In
     space there are half as many cells along each direction.
     """
     if line:
-        return of_case[0] if of_case[0] < own[0] else 2 * own[0], own[1]
+        return of_model[0] if of_model[0] < own[0] else 2 * own[0], own[1]
     half = own[0] // 2, own[1] // 2
     return half if min(half) >= FEWEST else None
 
@@ -183,7 +224,7 @@ def _fewer(cells: int) -> int:
 
 
 def _difference(own: ProbeRun, other: ProbeRun, share: float) -> Numbers:
-    """Return ``share`` times the relative differences; below 0 if ``own`` is the finer case."""
+    """Return ``share`` times the relative differences; below 0 if ``own`` is the finer model."""
 
     def relative(mine: float, others: float) -> float:
         finer = mine if share < 0.0 else others

@@ -1,4 +1,4 @@
-"""Probe runs of a case: its structure and contacts wear over all cycles in a few steps.
+"""Probe runs of a wear model: its structure and contacts wear over all cycles in a few steps.
 
 Probe runs with settings that differ in one thing have nearly the same error due to their few steps,
 so that their difference is the effect of this setting.
@@ -6,36 +6,32 @@ so that their difference is the effect of this setting.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import Any, Literal
+from typing import Literal
 
 from fe_models.meshes.structure_mesh import MeshError
+from sa_solver.errors import InputError
 from sa_solver.normal.contact import NormalContactError
 from sa_solver.types import Array
-from wear.contact.interface import MotionError
+from wear.contact.interface import InterfaceContact, MotionError
 from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState
 from wear.schedule import CoupledSettings, JumpSize
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.stepping import ContactFailure
-from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.case.sections import ContactStress, Life, Step
-from workflow.analyses.wear.structure import AnyWearCase
-from workflow.analyses.wear.translation import face_contact
-from workflow.case.changing import changed
 from workflow.errors import MethodFailed, UserError
 from workflow.models.contact import FaceContact
 from workflow.models.contacts import FaceContacts
-from workflow.models.loads import LoadSource
+from workflow.models.loads import ContactFace, LoadSource
+from workflow.models.wear import WearModel
 
 Numbers = dict[str, dict[str, float]]  # by interface and quantity
 
 # Errors that may end a probe run.
 FAILURES = (MeshError, NormalContactError, ContactFailure, MethodFailed)
-# Errors that may end a probe run of a case that is not checked yet.
-UNCHECKED_FAILURES = (*FAILURES, MotionError, UserError)
+# Errors that may end a probe run of a model that is not checked yet.
+UNCHECKED_FAILURES = (*FAILURES, MotionError, UserError, InputError)
 # Number of implicit steps. On the default joint, 3 and 8 steps give the same errors of increments
 # and meshes within 2 %, and of grids within 20 % of these errors.
 STEPS = 3
@@ -86,43 +82,34 @@ def _largest_pressures(state: CoupledState) -> list[float]:
     ]
 
 
-def shortened(case: AnyWearCase, settings: Mapping[str, Any]) -> AnyWearCase:
-    """Return the case of a probe run, with other ``settings`` by their dotted paths."""
-    step = Step.model_construct(kind="implicit", cycles=case.wear.cycles / STEPS)
-    return changed(
-        case,
-        {
-            "contact.tolerance": TOLERANCE,
-            "wear.step": step,
-            "stress": ContactStress(section="none", life=Life(parameter="none")),
-            **settings,
-        },
-    )
-
-
 def probe_run(
-    case: WearCase,
+    model: WearModel,
     source: LoadSource,
     resultants: Literal["constant", "every"] = "constant",
     begun: ProbeRun | None = None,
 ) -> ProbeRun:
-    """Run a case that is :func:`shortened`.
+    """Run a model over all its cycles in a few steps, whatever the steps of its wear are.
 
     With ``begun``, it starts from the unworn state of that run and with its contacts. Raises one of
     :data:`FAILURES` if structure or contacts fail.
     """
     if begun is None:
         # The error of its steps and the loads on its last surfaces are not needed.
-        stages = [face_contact(case, face, ImplicitStepper(alone=True)) for face in source.faces]
+        stages = [_stage(model, face) for face in source.faces]
     else:
         stages = begun.contacts
-    cycles, contacts = case.wear.cycles, FaceContacts.half_spaces(stages).wearing
+    cycles, contacts = model.wear.cycles, FaceContacts.half_spaces(stages).wearing
     settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)
     loop = CoupledWear(settings, source, contacts)
     state = loop.begin(source.unworn())[0] if begun is None else begun.states[0]
     states = [state, *islice(loop.march(state), STEPS - 1)]
     last = CoupledWear(replace(settings, resultants="constant"), source, contacts)
     return ProbeRun(stages, [*states, *last.march(states[-1])])
+
+
+def _stage(model: WearModel, face: ContactFace) -> FaceContact:
+    contact = model.contact(face.face.name)
+    return FaceContact(face, contact, model.wear, InterfaceContact, ImplicitStepper(alone=True))
 
 
 def scales(values: Numbers) -> Numbers:

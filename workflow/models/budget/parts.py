@@ -7,16 +7,20 @@ have this approximation.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
-from workflow.analyses.wear.output.layout import PRESSURES, WORN
-from workflow.analyses.wear.output.outcome import InterfaceOutcome
+from workflow.models.budget import names
+from workflow.models.budget.names import PRESSURES, WORN
+from workflow.models.budget.outcome import InterfaceOutcome
+from workflow.models.contact import Contact
+from workflow.models.loads import LoadSource, UncoupledSource
+from workflow.models.uncoupled.body_pair import BodyPairSource
+from workflow.models.wear import WearModel
 
 # Error due to the contact solver's tolerance, relative to the tolerance: at most 0.35 was found in
 # depth and volume, for tolerances from 1e-3 to 1e-6 on the flanks of two dovetails.
@@ -55,6 +59,11 @@ class ResultError:
         known = [(name, part) for name, part in self.parts.items() if part is not None]
         return sorted(known, key=lambda pair: -abs(pair[1]))
 
+    @property
+    def numbers(self) -> dict[str, float | None]:
+        """All parts and their ``total``; None for unknown ones."""
+        return {**self.parts, "total": self.total}
+
 
 ErrorByResult = Mapping[str, float | None]
 
@@ -63,18 +72,28 @@ ErrorByResult = Mapping[str, float | None]
 class ContactErrors:
     """Errors of one contact of a run due to each approximation.
 
-    ``peak`` is the increment of the largest load, and ``probed`` are errors from probe runs. Each
-    method returns the errors by result, or None if the run does not have this approximation.
+    ``source`` are the loads of the run, and ``probed`` are errors from probe runs. Each method
+    returns the errors by result, or None if the run does not have this approximation.
     """
 
-    case: WearCase
+    model: WearModel
+    source: LoadSource
     contact: InterfaceOutcome
-    peak: int
     probed: Mapping[str, Mapping[str, float]]  # by part and result
+
+    @property
+    def settings(self) -> Contact:
+        """Settings of the contact."""
+        return self.model.contact(self.contact.stage.name)
+
+    @property
+    def half_spaces(self) -> bool:
+        """True if both bodies are true half-spaces; for other loads half-spaces are a model."""
+        return isinstance(self.source, BodyPairSource)
 
     def link(self) -> ErrorByResult | None:
         """Return the difference of energies, and the error of the fit."""
-        if self.case.half_spaces or self.case.contact.method == "nodes":
+        if self.half_spaces or self.settings.method == "nodes":
             return None
         link = self.contact.first.link
         if not link.corrects:
@@ -88,7 +107,7 @@ class ContactErrors:
         return {**dict.fromkeys(WORN, apart), **dict.fromkeys(PRESSURES, misfit)}
 
     def mesh(self) -> ErrorByResult | None:
-        return None if self.case.half_spaces else self._from_probes("mesh", WORN | PRESSURES)
+        return None if self.half_spaces else self._from_probes("mesh", WORN | PRESSURES)
 
     def increments(self) -> ErrorByResult:
         return _by_result(self.contact.increments_error, "depth", "energy", "depth")
@@ -99,7 +118,7 @@ class ContactErrors:
         Probe runs slide wherever their loads slide. In partial slip the error due to the border of
         the stick zone is added, and is the only known part without probe runs.
         """
-        contact, method = self.contact, self.case.contact.method
+        contact, method = self.contact, self.settings.method
         if method == "nodes":
             return None
         errors = self._from_probes("grid", (*WORN, "peak_pressure"))
@@ -107,19 +126,19 @@ class ContactErrors:
             for name in WORN:
                 errors[name] = _with_border(errors[name], contact.border_error, name)
         if errors["peak_pressure"] is None:
-            errors["peak_pressure"] = -peak_lowered(contact.first.pressure[self.peak])
-        return errors | {"worn_peak_pressure": peak_lowered(contact.end.pressure[self.peak])}
+            errors["peak_pressure"] = -peak_lowered(contact.first.pressure[self.source.peak])
+        return errors | {"worn_peak_pressure": peak_lowered(contact.end.pressure[self.source.peak])}
 
     def steps(self) -> ErrorByResult:
         return _by_result(self.contact.step_error, "depth", "volume", "pressure")
 
     def coupling(self) -> ErrorByResult | None:
-        if not isinstance(self.case, FiniteElementCase) or self.case.contact.method == "nodes":
+        if isinstance(self.source, UncoupledSource) or self.settings.method == "nodes":
             return None
         return self._from_probes("coupling", WORN)
 
     def solver(self) -> ErrorByResult:
-        error = ERROR_PER_TOLERANCE * self.case.contact.tolerance
+        error = ERROR_PER_TOLERANCE * self.settings.tolerance
         return dict.fromkeys(WORN | PRESSURES, error)
 
     def _from_probes(self, part: str, results: Iterable[str]) -> dict[str, float | None]:
@@ -159,3 +178,34 @@ def peak_lowered(pressure: Array) -> float:
             means = 0.5 * (first + last)
     peak = float(pressure.max())
     return 1.0 - float(means.max()) / peak if peak > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class BudgetPart:
+    """Part of the budget: its ``errors`` of a contact, of which ``signed`` ones have a known sign.
+
+    ``errors`` returns None where a run does not have the approximation.
+    """
+
+    errors: Callable[[ContactErrors], ErrorByResult | None]
+    signed: tuple[str, ...] = ()
+
+
+# Results whose error has a known sign. Steps and increments make some places of a surface too deep
+# and others too shallow, and nothing is known of the sign at worn edges.
+VOLUME = ("volume",)
+WEAR = "depth", *VOLUME
+WEAR_AND_PEAK = *WEAR, "peak_pressure"
+
+PARTS = {
+    "link": BudgetPart(ContactErrors.link, WEAR),
+    "mesh": BudgetPart(ContactErrors.mesh, WEAR_AND_PEAK),
+    "increments": BudgetPart(ContactErrors.increments, VOLUME),
+    "grid": BudgetPart(ContactErrors.grid, WEAR_AND_PEAK),
+    "steps": BudgetPart(ContactErrors.steps),
+    "coupling": BudgetPart(ContactErrors.coupling, WEAR),
+    "solver": BudgetPart(ContactErrors.solver),
+}
+"""Parts of the budget by name."""
+
+assert tuple(PARTS) == names.PARTS

@@ -8,6 +8,9 @@ from math import inf, isfinite, log
 
 from scipy.optimize import brentq
 
+# Highest orders of convergence of depth and volume that estimates assume. The square-root end of a
+# pressure keeps a grid from second order.
+GRID_ORDER = MESH_ORDER = INCREMENTS_ORDER = 2.0
 # An observed order outside these bounds is an accident: the values hardly converge, or agree by
 # chance.
 LOWEST_ORDER, HIGHEST_ORDER = 0.2, 6.0
