@@ -107,3 +107,47 @@ def test_an_observer_is_given_in_a_list():
 def test_a_contact_of_few_cells_is_warned_of(cells):
     with pytest.warns(fretscale.ModelWarning, match="10 are needed"):
         model(of=contact(grid=cells)).run()
+
+
+def joint():
+    return fretscale.wear_model("cases/dovetail_2d.yaml").structure
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"increments": 0},
+        {"increments": 8, "peak_at": 8},
+        {"peak_at": 0},
+        {"rotation_speed": 0.0},
+        {"airfoil_mass": -1e-3},
+        {"airfoil_mass": None},
+    ],
+)
+def test_a_mission_rises_to_its_peak_and_falls(changed):
+    with pytest.raises(InputError):
+        replace(joint().missions[0], **changed)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"shares": (-1.0,)}, {"shares": (0.5,)}, {"sides": "free"}],
+)
+def test_a_joint_has_all_of_its_missions_and_sides(changed):
+    with pytest.raises(InputError):
+        replace(joint(), **changed)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"flank_angle": 45.0}, {"flank_angle": 0.0}, {"skew": 10.0}, {"flank_length": -8.0}],
+)
+def test_a_dovetail_that_cannot_be_drawn_is_refused(changed):
+    """Angles are in radians: 45 would be drawn as another angle."""
+    with pytest.raises(fretscale.FretscaleError):
+        replace(joint().geometry, **changed)
+
+
+def test_elements_are_of_order_1_or_2():
+    with pytest.raises(InputError):
+        fretscale.DovetailMesh(order=3)
