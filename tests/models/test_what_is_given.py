@@ -151,3 +151,16 @@ def test_a_dovetail_that_cannot_be_drawn_is_refused(changed):
 def test_elements_are_of_order_1_or_2():
     with pytest.raises(InputError):
         fretscale.DovetailMesh(order=3)
+
+
+def test_a_checkpoint_is_a_file_in_a_folder(tmp_path):
+    for path in (tmp_path, tmp_path / "missing" / "state.h5"):
+        with pytest.raises(fretscale.UserError):
+            fretscale.Checkpoint(path)
+
+
+def test_a_state_beyond_the_end_is_refused(tmp_path):
+    checkpoint = fretscale.Checkpoint(tmp_path / "state.h5")
+    model().run([checkpoint])
+    with pytest.raises(InputError, match="cycles"):
+        model(wear=fretscale.Wear(cycles=50.0)).run(start=checkpoint.state())

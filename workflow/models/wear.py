@@ -16,6 +16,7 @@ from wear.contact.interface import FirstContact, InterfaceContact
 from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState, Observer, observed
 from wear.schedule import CoupledSettings
+from wear.steps.steppers import ROUNDING
 from workflow.errors import ModelWarning
 from workflow.models.contact import (
     Contact,
@@ -206,6 +207,11 @@ class WearModel:
                 warnings.warn(message, ModelWarning, stacklevel=2)
             if start is not None:
                 check_start(start, state)
+                if start.cycles[-1] > self.wear.cycles * (1.0 + ROUNDING):
+                    raise InputError(
+                        f"the state to start from has {start.cycles[-1]:g} cycles, the model "
+                        f"{self.wear.cycles:g}: give the model more"
+                    )
                 state = start
             end, found = loop.run(state), None
             if self.stress is not None:
