@@ -16,6 +16,8 @@ from fe_models.meshes.structure_mesh import Body, MeshError, StructureMesh
 from fe_models.meshes.trace import LinearTrace
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
+from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Material
 
 # Boundary of the blade on which the airfoil's pull acts.
@@ -59,6 +61,17 @@ class Mission:
     airfoil_mass: float
     airfoil_radius: float
     aerodynamic_moment: float
+
+    def __post_init__(self) -> None:
+        increments = checks.whole("increments", self.increments)
+        if not 1 <= checks.whole("peak_at", self.peak_at) < increments:
+            raise InputError(
+                f"the speed peaks at {self.peak_at} of {increments} increments: give 1 or more, "
+                "and more increments than that"
+            )
+        checks.numbers(self, "rotation_speed", above=0.0)
+        checks.numbers(self, "airfoil_mass", "airfoil_radius", least=0.0)
+        checks.numbers(self, "aerodynamic_moment")
 
     def speeds(self) -> Array:
         """Return the rotation speed at the end of each increment, ``(increments,)`` [rad/s]."""

@@ -113,10 +113,13 @@ def number(
 
 
 def numbers(holder: object, *names: str, **bounds: Any) -> None:
-    """Check the fields ``names`` of ``holder`` by :func:`number`, except those that are None."""
+    """Check the fields ``names`` of ``holder``, an instance of a class, by :func:`number`.
+
+    A field may be None where None is its default.
+    """
     for name in names:
-        value = getattr(holder, name)
-        if value is not None:
+        value, optional = getattr(holder, name), getattr(type(holder), name, ...) is None
+        if value is not None or not optional:
             number(name.replace("_", " "), value, **bounds)
 
 

@@ -122,9 +122,13 @@ class Dovetail:
     end_width: float | None = None
 
     def __post_init__(self) -> None:
-        for parameter in fields(self):
-            if parameter.name != "blades":
-                checks.numbers(self, parameter.name, error=MeshError)
+        lengths = {parameter.name for parameter in fields(self)} - {"flank_angle", "skew", "blades"}
+        checks.numbers(self, *sorted(lengths), above=0.0, error=MeshError)
+        for name in ("flank_angle", "skew"):
+            angle = checks.number(f"{name} [rad]", getattr(self, name), error=MeshError)
+            if not abs(angle) < 0.5 * np.pi or (name == "flank_angle" and angle <= 0.0):
+                least = "above 0 and " if name == "flank_angle" else ""
+                raise MeshError(f"{name} = {angle:g} rad: give {least}less than a right angle")
         if checks.whole("blades", self.blades, MeshError) < 2:
             raise MeshError(f"{self.blades} blades: give 2 or more")
 

@@ -95,6 +95,10 @@ class Checkpoint(Observer):
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
+        if self.path.is_dir() or not self.path.parent.is_dir():
+            raise UserError(
+                f"{self.path}: no file can be there; give a file in a folder that exists"
+            )
 
     def jump_finished(self, before: CoupledState, after: CoupledState) -> None:
         data, _ = packed(after)

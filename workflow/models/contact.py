@@ -10,8 +10,10 @@ import numpy as np
 
 from fe_models.meshes.transfer import FaceTransfer
 from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
+from sa_solver.surfaces.resolution import cells_across, fewest_across, peak_error
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
@@ -36,6 +38,8 @@ STEPS = "implicit", "second_order", "explicit"
 # A run with explicit steps, a fraction of their stability limit each, is recorded in this many
 # jumps: single steps are too short to record.
 RECORDS = 10
+# A larger tolerance of the contact solver would return its first guess.
+LARGEST_TOLERANCE = 1e-3
 
 
 # --- settings -------------------------------------------------------------------------------------
@@ -92,7 +96,11 @@ class Contact:
         checks.choice("method", self.method, ("normal", "full", "nodes"))
         checks.choice("link", self.link, ("corrected", "half_space"))
         checks.choice("gross_slip", self.gross_slip, ("force", "energies"))
-        checks.numbers(self, "tolerance", above=0.0)
+        checks.numbers(self, "tolerance", above=0.0, most=LARGEST_TOLERANCE)
+        if not _are_two(self.bodies, lambda body: isinstance(body, Material)):
+            raise InputError("bodies: give two, the Material of body 1 and that of body 2")
+        if not _are_two(self.laws, lambda law: hasattr(law, "depth_per_pressure")):
+            raise InputError("laws: give two, the wear law of body 1 and that of body 2")
         if not isinstance(self.friction, CoulombFriction):
             checks.settle(self, friction=CoulombFriction(self.friction))
 
@@ -159,8 +167,17 @@ class Wear:
     def __post_init__(self) -> None:
         checks.choice("steps", self.steps, STEPS)
         checks.choice("motion", self.motion, MOTIONS)
-        checks.numbers(self, "cycles", least=0.0)
+        checks.numbers(self, "cycles", above=0.0)
         checks.numbers(self, "tolerance", "depth_tolerance", "fraction", above=0.0)
+        if not isinstance(self.jump, JumpSize) or not isinstance(self.stop, Stop):
+            raise InputError(
+                f"jump is {self.jump!r} and stop {self.stop!r}: give a JumpSize and a Stop"
+            )
+        if self.fraction is not None and (self.steps != "explicit" or self.jump != JumpSize()):
+            raise InputError(
+                "fraction is the length of explicit steps: give it with steps explicit and "
+                "without jump, or leave it out"
+            )
 
     @property
     def automatic(self) -> bool:
@@ -187,6 +204,11 @@ class Wear:
         return CoupledSettings(
             self.cycles, jump, self.stop, self.resultants, self.drift, friction=friction
         )
+
+
+def _are_two(values: object, fits: Callable[[object], bool]) -> bool:
+    """Return whether ``values`` are two, one for each body, and both fit."""
+    return isinstance(values, tuple | list) and len(values) == 2 and all(map(fits, values))
 
 
 # --- one face -------------------------------------------------------------------------------------
@@ -313,6 +335,21 @@ WornFaces = Sequence[tuple[FaceContact, FaceState]]
 """All contact faces, each with its state."""
 
 
+def few_cells_warnings(
+    stages: Sequence[FaceContact], first: Sequence[FirstContact], peak: int
+) -> Iterator[str]:
+    """Yield the warnings for contacts that cover too few cells at the ``peak`` load, unworn."""
+    for stage, found in zip(stages, first, strict=True):
+        pressed, enough = found.pressure[peak] > 0.0, fewest_across(stage.grid.line)
+        across = cells_across(pressed)[: 1 if stage.grid.line else 2]
+        if pressed.any() and min(across) < enough:
+            yield (
+                f"{stage.name}: the contact is only {' x '.join(map(str, across))} cells across, "
+                f"and {enough} are needed: the largest pressure may have an error of "
+                f"{peak_error(min(across)):.1%}: give the contact a finer grid"
+            )
+
+
 def border_warnings(stages: Sequence[FaceContact], first: Sequence[FirstContact]) -> Iterator[str]:
     """Yield the warnings for contacts that touch the border of their grid in the first cycle."""
     for stage, found in zip(stages, first, strict=True):
@@ -343,7 +380,13 @@ def last_cycle(contact: FaceSolution, state: FaceState) -> ContactEnd:
 def gap_on(face: ContactFace, grid: Grid) -> Array:
     """Return the unworn gap of a face on a grid over it ``(nx, ny)`` [mm]."""
     gap = face.gap(grid.x, grid.y)
-    return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
+    try:
+        return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
+    except ValueError as error:
+        raise InputError(
+            f"{face.face.name}: the gap has shape {np.shape(gap)} at x {grid.x.shape} and y "
+            f"{grid.y.shape}: give {grid.shape}"
+        ) from error
 
 
 def _follow(contact: Contact, wear: Wear) -> bool | None:

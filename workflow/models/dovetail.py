@@ -15,6 +15,7 @@ from fe_models.geometry.dovetail import Dovetail
 from fe_models.loads.pretension import Bolt
 from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.structure import Structure
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Material
 from workflow.models.budget.convergence import MESH_ORDER, share_of_difference
@@ -59,6 +60,10 @@ class DovetailMesh:
     size: float = 5.0
     notch: int = 48
     order: Literal[1, 2] = 1
+
+    def __post_init__(self) -> None:
+        if self.order not in (1, 2):
+            raise InputError(f"order is {self.order!r}: give 1 or 2")
 
     def refined(self, factor: float) -> DovetailMesh:
         """Return the mesh with elements that are finer by ``factor``; its notches stay the same."""
@@ -133,6 +138,9 @@ class DovetailJoint:
                 f"{len(self.missions)} missions and {len(self.shares)} shares: give as many of "
                 "both, one at least"
             )
+        if min(self.shares) < 0.0 or not np.isclose(sum(self.shares), 1.0):
+            raise InputError(f"shares {self.shares}: give 0 or more, which add up to 1")
+        checks.choice("sides", self.sides, ("guided", "cyclic"))
         if unknown := self.added.keys() - SIDES.keys():
             raise InputError(f"no flank called {', '.join(unknown)}: give intrados or extrados")
 

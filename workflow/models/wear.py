@@ -16,8 +16,16 @@ from wear.contact.interface import FirstContact, InterfaceContact
 from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState, Observer, observed
 from wear.schedule import CoupledSettings
+from wear.steps.steppers import ROUNDING
 from workflow.errors import ModelWarning
-from workflow.models.contact import Contact, FaceContact, Wear, WornFaces, border_warnings
+from workflow.models.contact import (
+    Contact,
+    FaceContact,
+    Wear,
+    WornFaces,
+    border_warnings,
+    few_cells_warnings,
+)
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 from workflow.models.nodal import nodal_contacts
@@ -75,6 +83,14 @@ class WearModel:
     wear: Wear
     stress: Stress | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.contacts, Contact | Mapping):
+            raise InputError("contacts: give a Contact, or one for each face by its name")
+        if not isinstance(self.wear, Wear):
+            raise InputError(f"wear is {self.wear!r}: give a Wear, such as Wear(cycles=1e5)")
+        if not isinstance(self.stress, Stress | None):
+            raise InputError(f"stress is {self.stress!r}: give a Stress, or None")
+
     def contact(self, name: str) -> Contact:
         """Return the contact of a face. Raises InputError where the model has none."""
         if isinstance(self.contacts, Contact):
@@ -110,6 +126,11 @@ class WearModel:
             return nodal_contacts(self.contact, self.wear, loads)
         if "nodes" in methods:
             raise InputError("method nodes is for all contacts of a model or for none")
+        if "normal" in methods and not loads.slip_known:
+            raise InputError(
+                "method normal wears by the slips of the loads, but these have none: give slips, "
+                "or method full"
+            )
         pairs = zip(faces, contacts, strict=True)
         return FaceContacts.half_spaces(
             [FaceContact(face, contact, self.wear, InterfaceContact) for face, contact in pairs]
@@ -158,8 +179,8 @@ class WearModel:
         Warns
         -----
         ModelWarning
-            A contact touches the border of its grid, the structure has an obvious fault, or its
-            stress is not fully known.
+            A contact touches the border of its grid, or covers too few cells; the structure has
+            an obvious fault, or its stress is not fully known.
 
         Raises
         ------
@@ -168,6 +189,8 @@ class WearModel:
         MethodFailed, ContactFailure
             A solver did not converge.
         """
+        if not isinstance(observers, Sequence):
+            raise InputError("observers: give a list of them, even of one")
         loads = self.loads(store)
         loads.prepare()
         # The matrices of contacts and increments are small: threads would only cost time.
@@ -184,6 +207,11 @@ class WearModel:
                 warnings.warn(message, ModelWarning, stacklevel=2)
             if start is not None:
                 check_start(start, state)
+                if start.cycles[-1] > self.wear.cycles * (1.0 + ROUNDING):
+                    raise InputError(
+                        f"the state to start from has {start.cycles[-1]:g} cycles, the model "
+                        f"{self.wear.cycles:g}: give the model more"
+                    )
                 state = start
             end, found = loop.run(state), None
             if self.stress is not None:
@@ -231,6 +259,8 @@ def _warnings(
     if isinstance(loads, StructureLoads):
         yield from (remark.text for remark in loads.remarks() if remark.is_warning)
     yield from border_warnings(contacts.stages, first)
+    if all(isinstance(stage.contact, InterfaceContact) for stage in contacts.stages):
+        yield from few_cells_warnings(contacts.stages, first, loads.peak)
 
 
 def check_start(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:

@@ -134,8 +134,9 @@ def error_budget(quantities: Sequence[SummaryQuantity], summary: Mapping[str, An
         return Html("")
     explained = note(
         "Error of a result due to each part, relative to the result; below 0 where the result is "
-        "known to be too small. “?” is unknown, “–” does not apply. The total adds parts of "
-        "known sign, plus half of each, and the sizes of the others."
+        "known to be too small. “?” is unknown, “–” does not apply. The total is the "
+        "root of the sum of three squares: the sum of the parts of known sign, half of their root "
+        "sum of squares, and the sum of the sizes of the others."
     )
     numbers = range(1, len(columns) + 2)
     return lines([table(["", *columns, "total"], rows, numbers), explained])

@@ -196,3 +196,10 @@ def test_what_is_no_number_is_refused(value):
 def test_what_has_no_meaning_is_refused(attempt):
     with pytest.raises(InputError):
         attempt()
+
+
+@pytest.mark.parametrize("law", [SLIDER, BoucWen(1e4, 0.5, 100.0), UniformIwan(1e4, 0.5, 100.0)])
+def test_a_period_of_no_joints_is_refused(law):
+    """The compiled marches read the first joint, of which there is none."""
+    with pytest.raises(InputError, match="no joints"):
+        PeriodicMarch(law).settle(np.zeros((0, 2, 1)), BASIS, BASIS.T / 32)

@@ -311,6 +311,9 @@ class PeriodicMarch:
 
     def _require(self, coefficients: Array, basis: Array, weights: Array, lead: Array) -> None:
         joints, size, directions = coefficients.shape
+        if joints == 0:
+            # The compiled marches read the first joint.
+            raise JointError("the coefficients are of no joints: give those of 1 or more")
         if directions != self.directions:
             raise JointError(
                 f"the coefficients have {directions} directions, the joints {self.directions}: "

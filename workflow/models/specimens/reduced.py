@@ -14,6 +14,7 @@ from fe_models.joints.reduction import ReducedModel, free_frequencies
 from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.specimens import STEPS, pad_stiffness, reduced_specimens, specimen_matrices
 from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Grid, Material, Progress, Tally, unseen
 from workflow.models.gaps import AddedGap
 from workflow.models.structure_model import NoStore, StructureStore
@@ -67,6 +68,11 @@ class SpecimenPair:
     def __post_init__(self) -> None:
         checks.numbers(self, "size", above=0.0)
         checks.numbers(self, "modes", least=1)
+        checks.whole("modes", self.modes)
+        if self.order not in (1, 2):
+            raise InputError(f"order is {self.order!r}: give 1 or 2")
+        if len(self.materials) != 2 or not all(body.density > 0.0 for body in self.materials):
+            raise InputError("materials: give two, each with a density above 0")
 
     @cached_property
     def reduced(self) -> ReducedSpecimens:

@@ -88,8 +88,16 @@ class BodyPair:
 
     def __post_init__(self) -> None:
         checks.choice("tilt", self.tilt, ("held", "free"))
+        if not callable(self.gap):
+            raise InputError("gap is no function: give one that returns the distance at x and y")
+        if not isinstance(self.loads, LoadTable):
+            raise InputError(f"loads are {self.loads!r}: give a LoadTable")
         if problem := conflict(self.loads.columns):
             raise InputError(f"loads of two bodies: {': '.join(problem)}")
+        if (force := self.loads["P"].min()) < 0.0:
+            raise InputError(f"P = {force:g} N pulls the bodies apart: give 0 or more")
+        if self.peak is not None:
+            checks.places("the peak", checks.whole("peak", self.peak), len(self.loads))
 
     def in_parts(self, parts: int) -> BodyPair:
         """Return the bodies under the same cycle with each increment split into equal ``parts``."""

@@ -8,6 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, LoadHistory
 from wear.contact.face_loads import CycleLoads
@@ -53,6 +55,25 @@ class GivenLoads(UncoupledSource):
     pairs: Sequence[tuple[ContactFace, CycleLoads | LoadHistory]]
     user_nodes: Sequence[Sequence[UserFace]] = ()
 
+    def __post_init__(self) -> None:
+        names = [face.face.name for face, _ in self.pairs]
+        lengths = {len(_history(loads)) for _, loads in self.pairs}
+        if not names or len(set(names)) < len(names):
+            raise InputError(f"faces are called {names}: give one or more, each by its own name")
+        if len(lengths) > 1 or 0 in lengths:
+            raise InputError(
+                f"loads of faces have {sorted(lengths)} increments: give equally many, at least 1"
+            )
+        if len({face.face.line for face, _ in self.pairs}) > 1:
+            raise InputError("some faces are line contacts, others are not: give one kind")
+        for face, loads in self.pairs:
+            history, name = _history(loads), face.face.name
+            if (force := history.P.min()) < 0.0:
+                raise InputError(f"{name}: P = {force:g} N pulls the bodies apart: give 0 or more")
+            if isinstance(loads, CycleLoads):
+                shape = len(history), 2, len(face.face)
+                checks.array(f"slips of {name}", loads.slip, shape)
+
     @cached_property
     def faces(self) -> tuple[ContactFace, ...]:
         return tuple(face for face, _ in self.pairs)
@@ -61,6 +82,11 @@ class GivenLoads(UncoupledSource):
     def line(self) -> bool:  # type: ignore[override]
         """True if the contacts are line contacts."""
         return self.faces[0].face.line
+
+    @property
+    def slip_known(self) -> bool:  # type: ignore[override]
+        """True if the loads of a face include the slips of its nodes."""
+        return any(isinstance(loads, CycleLoads) for _, loads in self.pairs)
 
     @cached_property
     def peak(self) -> int:  # type: ignore[override]
@@ -79,6 +105,11 @@ class GivenLoads(UncoupledSource):
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
         return tuple(self.user_nodes[number]) if self.user_nodes else ()
+
+
+def _history(loads: CycleLoads | LoadHistory) -> LoadHistory:
+    """Return the resultants of a face."""
+    return loads.loads if isinstance(loads, CycleLoads) else loads
 
 
 def no_slip(face: ContactFace, loads: LoadHistory) -> Array:

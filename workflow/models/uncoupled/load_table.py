@@ -69,6 +69,8 @@ class LoadTable:
         lengths = sorted({len(column) for column in columns.values()})
         if len(lengths) > 1:
             raise InputError(f"columns of loads differ in length: {lengths}")
+        if lengths == [0]:
+            raise InputError("columns of loads are empty: give a value per increment")
         checks.settle(self, columns=columns)
 
     @classmethod
@@ -91,6 +93,7 @@ class LoadTable:
         direction : float
             Direction of the stroke, from x to y [rad].
         """
+        _require_increments(increments)
         step = stroke / increments * np.array([np.cos(direction), np.sin(direction)])
         there = np.tile(step, (increments, 1))
         path = np.cumsum(np.concatenate([there, -there]), axis=0)
@@ -116,6 +119,7 @@ class LoadTable:
         closed : bool
             Whether the first leg begins where the last one ends, as in a cycle; else at 0.
         """
+        _require_increments(*increments)
         if any(len(ends) != len(increments) for ends in targets.values()):
             raise InputError(f"{len(increments)} legs: give as many targets of every column")
         columns = {}
@@ -187,6 +191,13 @@ class LoadTable:
             return np.asarray(before + shares * (column[:, None] - before)).ravel()
 
         return LoadTable({name: split(column) for name, column in self.columns.items()})
+
+
+def _require_increments(*counts: int) -> None:
+    """Raise InputError unless every count of increments is a whole number of 1 or more."""
+    for count in counts:
+        if checks.whole("a number of increments", count) < 1:
+            raise InputError(f"a leg of {count} increments is not possible: give 1 or more")
 
 
 def conflict(named: Container[str]) -> tuple[str, str] | None:

@@ -1,0 +1,166 @@
+"""What models refuse, and what they warn of."""
+
+from dataclasses import replace
+
+import fretscale
+import numpy as np
+import pytest
+
+from fe_models.geometry import Specimen
+from sa_solver import InputError, LoadHistory, Material
+from wear import ArchardLaw, CycleLoads, EnergyLaw
+
+TITANIUM, LAW = Material(115e3, 0.29), EnergyLaw(1e-8)
+STROKE = fretscale.LoadTable.stroke(P=50.0, stroke=0.02)
+
+
+def gap(x, y):
+    return (x**2 + y**2) / 20.0
+
+
+def contact(**changed):
+    given = {"grid": (32, 32), "bodies": (TITANIUM,) * 2, "laws": (LAW, LAW), "friction": 0.6}
+    return fretscale.Contact(**given | changed)
+
+
+def ball(**changed):
+    return fretscale.BodyPair(**{"gap": gap, "size": (0.6, 0.6), "loads": STROKE} | changed)
+
+
+def model(structure=None, of=None, wear=None):
+    wear = wear or fretscale.Wear(cycles=100.0)
+    return fretscale.WearModel(structure or ball(), of or contact(), wear)
+
+
+def pad(name="pad", line=True):
+    return fretscale.ContactFace.nominal(name, (0.8, 0.8), lambda x, y: x**2 / 20.0, line=line)
+
+
+def history(P=(50.0, 50.0)):
+    zero = np.zeros(len(P))
+    return LoadHistory(np.array(P), *[zero] * 7, sliding=zero > 0.0)
+
+
+@pytest.mark.parametrize(
+    "refused",
+    [
+        lambda: contact(bodies=(TITANIUM,)),
+        lambda: contact(bodies=TITANIUM),
+        lambda: contact(laws=(LAW, None)),
+        lambda: contact(friction=None),
+        lambda: contact(tolerance=1.0),
+        lambda: EnergyLaw(None),
+        lambda: ArchardLaw(1e-4, None),
+        lambda: fretscale.Wear(cycles=0.0),
+        lambda: fretscale.Wear(cycles=None),
+        lambda: fretscale.Wear(cycles=10.0, jump=5.0),
+        lambda: fretscale.Wear(cycles=10.0, stop=5.0),
+        lambda: fretscale.Wear(cycles=10.0, fraction=0.5),
+        lambda: fretscale.Wear(
+            cycles=10.0, steps="explicit", fraction=0.5, jump=fretscale.JumpSize(cycles=1.0)
+        ),
+        lambda: model(of=[contact()]),
+        lambda: model(wear=100.0),
+        lambda: replace(model(), stress=True),
+        lambda: fretscale.SpecimenPair(Specimen(), (TITANIUM,) * 2),
+        lambda: fretscale.SpecimenPair(Specimen(), (replace(TITANIUM, density=4e-9),) * 2, order=3),
+    ],
+)
+def test_settings_without_a_meaning_are_refused(refused):
+    with pytest.raises(InputError):
+        refused()
+
+
+@pytest.mark.parametrize(
+    "refused",
+    [
+        lambda: fretscale.LoadTable({"P": [], "shift_x": []}),
+        lambda: fretscale.LoadTable.stroke(P=50.0, stroke=0.02, increments=0),
+        lambda: fretscale.LoadTable.stroke(P=50.0, stroke=0.02, increments=2.5),
+        lambda: fretscale.LoadTable.legs({"P": (50.0, 50.0)}, (-1, 2)),
+        lambda: ball(loads=None),
+        lambda: ball(loads=fretscale.LoadTable({"P": [50.0, -1.0], "shift_x": [0.01, 0.0]})),
+        lambda: ball(gap=10.0),
+        lambda: ball(peak=len(STROKE)),
+        lambda: model(ball(gap=lambda x, y: gap(x, y)[:5])).run(),
+        lambda: model(ball(loads=fretscale.LoadTable({"P": [50.0], "shift_x": [0.01]}))).run(),
+        lambda: fretscale.GivenLoads([]),
+        lambda: fretscale.GivenLoads([(pad(), history()), (pad(), history())]),
+        lambda: fretscale.GivenLoads([(pad(), history()), (pad("foot", line=False), history())]),
+        lambda: fretscale.GivenLoads([(pad(), history()), (pad("foot"), history([50.0]))]),
+        lambda: fretscale.GivenLoads([(pad(), history([50.0, -50.0]))]),
+        lambda: fretscale.GivenLoads([(pad(), CycleLoads(history(), np.zeros((2, 2, 9))))]),
+        lambda: model(fretscale.GivenLoads([(pad(), history())])).run(),
+    ],
+)
+def test_loads_without_a_meaning_are_refused(refused):
+    with pytest.raises(InputError):
+        refused()
+
+
+def test_an_observer_is_given_in_a_list():
+    with pytest.raises(InputError, match="give a list"):
+        model().run(fretscale.Progress())
+
+
+@pytest.mark.parametrize("cells", [(32, 1), (32, 8)])
+def test_a_contact_of_few_cells_is_warned_of(cells):
+    with pytest.warns(fretscale.ModelWarning, match="10 are needed"):
+        model(of=contact(grid=cells)).run()
+
+
+def joint():
+    return fretscale.wear_model("cases/dovetail_2d.yaml").structure
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"increments": 0},
+        {"increments": 8, "peak_at": 8},
+        {"peak_at": 0},
+        {"rotation_speed": 0.0},
+        {"airfoil_mass": -1e-3},
+        {"airfoil_mass": None},
+    ],
+)
+def test_a_mission_rises_to_its_peak_and_falls(changed):
+    with pytest.raises(InputError):
+        replace(joint().missions[0], **changed)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"shares": (-1.0,)}, {"shares": (0.5,)}, {"sides": "free"}],
+)
+def test_a_joint_has_all_of_its_missions_and_sides(changed):
+    with pytest.raises(InputError):
+        replace(joint(), **changed)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"flank_angle": 45.0}, {"flank_angle": 0.0}, {"skew": 10.0}, {"flank_length": -8.0}],
+)
+def test_a_dovetail_that_cannot_be_drawn_is_refused(changed):
+    """Angles are in radians: 45 would be drawn as another angle."""
+    with pytest.raises(fretscale.FretscaleError):
+        replace(joint().geometry, **changed)
+
+
+def test_elements_are_of_order_1_or_2():
+    with pytest.raises(InputError):
+        fretscale.DovetailMesh(order=3)
+
+
+def test_a_checkpoint_is_a_file_in_a_folder(tmp_path):
+    for path in (tmp_path, tmp_path / "missing" / "state.h5"):
+        with pytest.raises(fretscale.UserError):
+            fretscale.Checkpoint(path)
+
+
+def test_a_state_beyond_the_end_is_refused(tmp_path):
+    checkpoint = fretscale.Checkpoint(tmp_path / "state.h5")
+    model().run([checkpoint])
+    with pytest.raises(InputError, match="cycles"):
+        model(wear=fretscale.Wear(cycles=50.0)).run(start=checkpoint.state())
