@@ -81,3 +81,13 @@ def test_an_added_gap_is_on_top_of_the_form(model):
     face = replace(model.specimens, added=bump).reduced.face
     flat = model.specimens.reduced.face
     np.testing.assert_allclose(face.gap - flat.gap, 1e-3 * face.coordinates[:, 0], atol=1e-15)
+
+
+def test_blocks_are_within_their_stability_limit(model):
+    with pytest.raises(InputError, match="1 or less"):
+        replace(model, fraction=1.5)
+
+
+def test_specimens_that_wear_keep_no_further_point(model):
+    with pytest.raises(InputError, match="target_distance"):
+        replace(model, specimens=replace(model.specimens, target_distance=1.0))

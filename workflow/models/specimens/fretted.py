@@ -100,7 +100,10 @@ class FrettedSpecimens:
     block: float | None = None
 
     def __post_init__(self) -> None:
-        checks.numbers(self, "cycles", "energy", "fraction", "block", above=0.0)
+        checks.numbers(self, "cycles", "energy", "block", above=0.0)
+        checks.numbers(self, "fraction", above=0.0, most=1.0)
+        if self.specimens.target_distance is not None:
+            raise InputError("target_distance is for specimens of a rig: leave it out to wear them")
         if (self.cycles is None) == (self.energy is None):
             raise InputError("specimens wear over a number of cycles or to an energy: give one")
 
