@@ -14,6 +14,9 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 
+# Least number of time steps in a period or a blow: fewer do not resolve the force.
+FEWEST_STEPS = 20
+
 
 class ExcitationError(InputError):
     """Error in the parameters of an excitation force."""
@@ -36,6 +39,11 @@ class ExcitationForce(ABC):
     @abstractmethod
     def value(self, times: Array) -> Array:
         """Return the signal [N] in the shape of ``times``."""
+
+    @property
+    def longest_step(self) -> float:
+        """Longest time step that resolves the signal [s]."""
+        return np.inf
 
 
 @dataclass(frozen=True)
@@ -112,6 +120,10 @@ class HarmonicForce(ExcitationForce):
             wave = wave * 0.5 * (1.0 - np.cos(np.pi * np.clip(times / self.ramp, 0.0, 1.0)))
         return np.asarray(wave)
 
+    @property
+    def longest_step(self) -> float:
+        return 1.0 / (FEWEST_STEPS * self.frequency)
+
 
 @dataclass(frozen=True)
 class HammerBlow(ExcitationForce):
@@ -162,6 +174,10 @@ class HammerBlow(ExcitationForce):
         share = (times - self.start) / self.duration
         touching = (share > 0.0) & (share < 1.0)
         return np.where(touching, self.peak * np.sin(np.pi * share), 0.0)
+
+    @property
+    def longest_step(self) -> float:
+        return self.duration / FEWEST_STEPS
 
 
 @dataclass(frozen=True)
@@ -224,6 +240,10 @@ class RecordedForce(ExcitationForce):
 
     def value(self, times: Array) -> Array:
         return np.asarray(np.interp(times, self.times, self.force))
+
+    @property
+    def longest_step(self) -> float:
+        return float(np.diff(self.times).min(initial=np.inf))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 import xarray
 
-from fe_models.dynamics import HarmonicForce, Link, TimeStepControl, lumped_rig
+from fe_models.dynamics import (
+    HammerBlow,
+    HarmonicForce,
+    Link,
+    RecordedForce,
+    TimeStepControl,
+    lumped_rig,
+)
+from sa_solver.errors import InputError
 from wear.joints import Jenkins
 from workflow.shell.folders import steps
 
@@ -48,7 +56,22 @@ def test_a_sliding_joint_dissipates_what_its_force_moves(model):
 
 def test_long_steps_give_a_warning(model):
     with pytest.warns(fretscale.ModelWarning, match="time steps"):
-        replace(model, control=TimeStepControl(2e-3)).run()
+        replace(model, control=TimeStepControl(1e-3)).run()
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        HarmonicForce(np.ones(1), FORCE, FREQUENCY),
+        HammerBlow(np.ones(1), FORCE, duration=2e-3),
+        RecordedForce(np.ones(1), np.array([0.0, 1e-3, 0.1]), np.zeros(3)),
+    ],
+)
+def test_a_step_resolves_the_force(model, force):
+    """Steps longer than a blow would miss it."""
+    replace(model, force=force, control=TimeStepControl(force.longest_step))
+    with pytest.raises(InputError, match="does not resolve the force"):
+        replace(model, force=force, control=TimeStepControl(1.1 * force.longest_step))
 
 
 class Counted(HarmonicForce):

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from fe_models.dynamics.excitation import FEWEST_STEPS
 from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.excitation import (
     Excitation,
@@ -300,8 +301,6 @@ class RigCase(TimeCase):
 
 # Tolerance on the difference of two recorded times, for rounding.
 ROUNDING = 1e-9
-# Least number of steps in a period or a blow: fewer do not resolve the excitation.
-FEWEST_STEPS = 20
 
 
 def _longest_step(excitation: Harmonic | Hammer | Recorded) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from fe_models.dynamics.excitation import ExcitationForce
 from fe_models.dynamics.motion import Motion, Start
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
+from sa_solver.errors import InputError
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.coupled_state import Observer, observed
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 # Error by time steps, as a share of the largest displacement, from which a warning is given.
 LARGEST_ERROR = 0.05
+# Tolerance on the difference of two recorded times, for rounding.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,14 @@ class MotionModel:
     duration: float
     control: TimeStepControl
     start: Start | None = None
+
+    def __post_init__(self) -> None:
+        longest = self.force.longest_step
+        if self.control.step > (1.0 + ROUNDING) * longest:
+            raise InputError(
+                f"a time step of {self.control.step:g} s does not resolve the force: give one of "
+                f"at most {longest:g} s"
+            )
 
     def motion(
         self, steps: Steps = COMPUTED, reached: Callable[[float], None] = lambda share: None
