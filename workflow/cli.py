@@ -410,7 +410,7 @@ class _KindsInHelp(click.Command):
 @cli.command(cls=_KindsInHelp)
 @click.argument("kind", required=False, type=_Kind())
 @click.argument("file", required=False, type=click.Path(path_type=Path))
-@click.option("--short", is_flag=True, help="Only the required entries, in some twenty lines.")
+@click.option("--short", is_flag=True, help="Only the required entries.")
 def new(kind: str | None, file: Path | None, short: bool) -> None:
     """Write a commented case to FILE; without KIND list the kinds.
 

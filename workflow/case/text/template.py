@@ -9,7 +9,6 @@ from pydantic.fields import FieldInfo
 
 from workflow.case.sections import (
     KINDS_ARE_NAMED_BY,
-    ElasticSection,
     Section,
     entries_of,
     sections_of,
@@ -29,8 +28,6 @@ HEADER = f"""\
 SHORT_HEADER = """\
 # What must be given; `fretscale new KIND` shows every entry that there is, and its default.
 """
-# Material of the bodies in a short case.
-MATERIAL = "Ti-6Al-4V"
 # Optional entries that the template fills in, so that it describes a material that can yield, the
 # length of a run, legs that press, a face with rounded edges, a joint whose friction rises, and a
 # body that has mass and expands.
@@ -46,10 +43,7 @@ def template(model: type[Section], header: str = HEADER) -> str:
 
 
 def short_template(model: type[Section]) -> str:
-    """Return a case of a kind, ready to run, with required entries only.
-
-    Materials are given by name; all other entries have their defaults.
-    """
+    """Return a case of a kind, ready to run, with required entries only; others have defaults."""
     return SHORT_HEADER + render(_needed(model))
 
 
@@ -64,8 +58,6 @@ def _needed(model: type[Section]) -> list[EntryRow]:
             value = _needed(sections[0])
             within = any(row.key not in KINDS_ARE_NAMED_BY for row in value)
             given = given or (within and field.default not in (None, ()))
-            if issubclass(sections[0], ElasticSection):
-                value = MATERIAL
             if get_origin(field.annotation) is tuple:
                 value = [value]
         if given:
