@@ -1,4 +1,4 @@
-"""A source of loads of one's own: a cylinder that slides to and fro under a constant force."""
+"""A source of loads of one's own: a cylinder that slides forward and backward under a constant force."""
 
 import fretscale
 import numpy as np
@@ -20,7 +20,7 @@ class Reciprocation(fretscale.UncoupledSource):
 
 
 steel, law = Material(young=210e3, poisson=0.3), ArchardLaw(coefficient=1e-4, hardness=3000.0)
-contact = fretscale.Contact((70, 1), (steel, steel), (law, law), friction=0.5)
+contact = fretscale.Contact((160, 1), (steel, steel), (law, law), friction=0.5)
 model = fretscale.WearModel(Reciprocation(), contact, fretscale.Wear(cycles=2000.0))
 
 if __name__ == "__main__":

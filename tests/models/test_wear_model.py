@@ -121,7 +121,7 @@ def test_stress_under_a_contact_balances_its_loads(model):
     """The section carries the force, and the work of Ruiz is that of friction in a cycle."""
     stress = fretscale.Stress(depth=0.5, points=4, critical_distance=0.01)
     face = replace(model, stress=stress).run()["pad"]
-    cell = 1.4 / 70
+    cell = 1.4 / 160
     friction = face["life"]["friction_parameter"].sum(("x", "y")) * cell
     # F1 is a quarter of the work: friction 0.5 times 50 N/mm over 2 x 40 um.
     np.testing.assert_allclose(friction, 0.25 * 0.5 * 50.0 * 0.08, rtol=1e-7)
@@ -146,7 +146,7 @@ def test_own_loads_wear_by_archard():
     for body in (1, 2):
         worn = 1e-4 / 3000.0 * 50.0 * 0.08 * 2000.0
         assert face[f"volume_{body}"].values[-1] == pytest.approx(worn, rel=1e-12)
-        cell = 1.4 / 70
+        cell = 1.4 / 160
         by_depth = face[f"depth_{body}"].isel(cycles=-1).sum() * cell
         assert float(by_depth) == pytest.approx(worn, rel=1e-12)
     assert face["P"].attrs["units"] == "N/mm"

@@ -155,7 +155,7 @@ class UncoupledSource(ABC):
     ...         loads = LoadHistory(zero + 50.0, *[zero] * 7, sliding=zero == 0.0)
     ...         return (CycleLoads(loads, slip),)
     >>> steel, law = Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
-    >>> contact = fretscale.Contact((70, 1), (steel, steel), (law, law), friction=0.5)
+    >>> contact = fretscale.Contact((160, 1), (steel, steel), (law, law), friction=0.5)
     >>> results = fretscale.WearModel(Reciprocation(), contact, fretscale.Wear(2000.0)).run()
     >>> volume = results["pad"]["volume_1"]
     >>> print(f"{float(volume[-1]):.3e} {volume.attrs['units']}")
