@@ -1,4 +1,4 @@
-"""A source of loads of one's own: a cylinder that slides forward and backward under a constant force."""
+"""A source of loads of your own: a cylinder that slides back and forth under a constant force."""
 
 import fretscale
 import numpy as np
