@@ -1,4 +1,4 @@
-"""What models refuse, and what they warn of."""
+"""Models refuse settings without a meaning, and warn of implausible ones."""
 
 from dataclasses import replace
 

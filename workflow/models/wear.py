@@ -202,17 +202,9 @@ class WearModel:
                     self.stress.check(stage.grid)
             recorder = ResultsRecorder(contacts, loads.peak)
             loop = self.loop(loads, contacts, [*observers, recorder])
-            state, first = loop.begin(unworn)
+            state, first = self.begin(loop, unworn, start)
             for message in _warnings(loads, contacts, first):
                 warnings.warn(message, ModelWarning, stacklevel=2)
-            if start is not None:
-                check_start(start, state)
-                if start.cycles[-1] > self.wear.cycles * (1.0 + ROUNDING):
-                    raise InputError(
-                        f"the state to start from has {start.cycles[-1]:g} cycles, the model "
-                        f"{self.wear.cycles:g}: give the model more"
-                    )
-                state = start
             end, found = loop.run(state), None
             if self.stress is not None:
                 with observed(observers, "stress"):
@@ -220,6 +212,24 @@ class WearModel:
                 for message in found.faults(loads.peak):
                     warnings.warn(message, ModelWarning, stacklevel=2)
             return WearResults(recorder, end, unworn, loads.line, found).tree()
+
+    def begin(
+        self, loop: CoupledWear, unworn: Sequence[FaceLoads], start: CoupledState[Any] | None
+    ) -> tuple[CoupledState[Any], list[FirstContact]]:
+        """Return the state to wear from, which is ``start`` if given, and the first contacts.
+
+        Raises InputError unless ``start`` is a state of this model before its last cycle.
+        """
+        state, first = loop.begin(unworn)
+        if start is None:
+            return state, first
+        _check_start(start, state)
+        if start.cycles[-1] > self.wear.cycles * (1.0 + ROUNDING):
+            raise InputError(
+                f"the state to start from has {start.cycles[-1]:g} cycles, the model "
+                f"{self.wear.cycles:g}: give the model more"
+            )
+        return start, first
 
     def _stress(
         self,
@@ -263,7 +273,7 @@ def _warnings(
         yield from few_cells_warnings(contacts.stages, first, loads.peak)
 
 
-def check_start(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:
+def _check_start(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:
     """Raise InputError unless the state to start from fits the model of an ``unworn`` one.
 
     Faces and their gaps must be the same, and the loads too where wear has not changed them yet.

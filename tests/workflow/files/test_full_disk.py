@@ -16,7 +16,7 @@ from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow.errors import NotWritten
 from workflow.kinds import load_case
 from workflow.runs.run import resume_run, run_case
-from workflow.shell.folders.store import write_arrays, write_text
+from workflow.shell.folders.store import replacing_hdf5, write_arrays, write_text
 
 # Seconds within which a command has ended.
 PATIENCE = 120.0
@@ -79,6 +79,17 @@ def test_files_are_on_the_disk_before_they_have_their_name(synced, tmp_path):
     assert all(
         first[1] == second[1] for first, second in zip(synced[::2], synced[1::2], strict=True)
     )
+
+
+def test_two_files_of_one_name_are_written_at_the_same_time(tmp_path):
+    """Two runs in the threads of a program have one ``results.h5`` each."""
+    one, other = tmp_path / "one.h5", tmp_path / "other"
+    other.mkdir()
+    with replacing_hdf5(one) as first, replacing_hdf5(other / "one.h5") as second:
+        first["value"], second["value"] = 1, 2
+    for path, value in ((one, 1), (other / "one.h5", 2)):
+        with h5py.File(path) as file:
+            assert file["value"][()] == value
 
 
 FILLING = """

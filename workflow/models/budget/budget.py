@@ -24,7 +24,7 @@ from workflow.models.contact import ContactEnd, FaceContact, FaceState, Wear, la
 from workflow.models.loads import LoadSource
 from workflow.models.structure_model import StructureStore
 from workflow.models.uncoupled.body_pair import BodyPair
-from workflow.models.wear import WearModel, check_start
+from workflow.models.wear import WearModel
 
 # Powers of energy and pressure in a fretting parameter: Ruiz's is work times tension, that of
 # Smith, Watson and Topper stress times strain, that of Findley a stress.
@@ -140,10 +140,7 @@ def error_budget(
         unworn = source.unworn()
         contacts = model.face_contacts(source)
         loop = model.loop(source, contacts, observers)
-        state, first = loop.begin(unworn)
-        if start is not None:
-            check_start(start, state)
-            state = start
+        state, first = model.begin(loop, unworn, start)
         end = loop.run(state)
         states = contacts.states(end)
         ends = [partial(_same, of_face) for of_face in contacts.call(last_cycle, states)]

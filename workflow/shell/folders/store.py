@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import h5py
 
@@ -73,14 +74,19 @@ def replacing_hdf5(path: Path) -> Iterator[h5py.File]:
     HDF5 never writes to the disk itself: it aborts the whole process if the disk is full, and
     loses an interruption (Ctrl-C) that arrives while it writes to a Python file object.
     """
-    with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+    with _hdf5_in_memory() as file:
         yield file
-        image = hdf5_image(file)
+        image = _image(file)
     with replacing(path) as partial:
         partial.write_bytes(image)
 
 
-def hdf5_image(file: h5py.File) -> bytes:
+def _hdf5_in_memory() -> h5py.File:
+    # HDF5 takes two files in memory of one name for the same file, also in separate threads.
+    return h5py.File(uuid4().hex, "w", driver="core", backing_store=False)
+
+
+def _image(file: h5py.File) -> bytes:
     """Return the bytes of an HDF5 file."""
     file.flush()
     return file.id.get_file_image()
@@ -90,11 +96,11 @@ def write_arrays(
     path: Path, arrays: Mapping[str, Any], attributes: Mapping[str, Any] | None = None
 ) -> str:
     """Write named arrays (slashes allowed) and attributes of the root; return the digest."""
-    with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+    with _hdf5_in_memory() as file:
         for name, values in arrays.items():
             file.create_dataset(name, data=values)
         file.attrs.update(attributes or {})
-        image = hdf5_image(file)
+        image = _image(file)
     digest = _digest(io.BytesIO(image), path.name)
     with replacing(path) as partial, partial.open("wb") as raw:
         raw.write(digest.encode("ascii").ljust(SEAL, b"\0"))

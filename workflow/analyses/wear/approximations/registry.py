@@ -85,4 +85,4 @@ APPROXIMATIONS = (
 REMEDIES = {
     known.remedy.part: known.remedy.setting for known in APPROXIMATIONS if known.remedy is not None
 }
-"""What reduces each part of the error budget, where the case does not say more."""
+"""Remedy for each part of the error budget, where the case gives no better one."""
