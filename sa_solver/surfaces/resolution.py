@@ -45,6 +45,15 @@ def fewest_across(line: bool) -> int:
     return FEWEST_LINE_CELLS if line else FEWEST_CELLS
 
 
+def too_few_across(pressed: Mask, line: bool) -> tuple[int, ...]:
+    """Return the cells across a contact, along x alone for a ``line``; empty if they are enough.
+
+    It is empty too if no cell of ``pressed`` ``(nx, ny)`` is pressed.
+    """
+    across = cells_across(pressed)[: 1 if line else 2]
+    return across if max(across) > 0 and min(across) < fewest_across(line) else ()
+
+
 def peak_error(cells: int) -> float:
     """Return by how much the largest pressure is too low, about, with this many cells across."""
     return min(1.0, (1.0 if cells > POINT else 2.0) / cells**2)

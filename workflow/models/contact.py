@@ -13,7 +13,7 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
-from sa_solver.surfaces.resolution import cells_across, fewest_across, peak_error
+from sa_solver.surfaces.resolution import fewest_across, peak_error, too_few_across
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
@@ -340,13 +340,11 @@ def few_cells_warnings(
 ) -> Iterator[str]:
     """Yield the warnings for contacts that cover too few cells at the ``peak`` load, unworn."""
     for stage, found in zip(stages, first, strict=True):
-        pressed, enough = found.pressure[peak] > 0.0, fewest_across(stage.grid.line)
-        across = cells_across(pressed)[: 1 if stage.grid.line else 2]
-        if pressed.any() and min(across) < enough:
+        if across := too_few_across(found.pressure[peak] > 0.0, stage.grid.line):
             yield (
                 f"{stage.name}: the contact is only {' x '.join(map(str, across))} cells across, "
-                f"and {enough} are needed: the largest pressure may have an error of "
-                f"{peak_error(min(across)):.1%}: give the contact a finer grid"
+                f"and {fewest_across(stage.grid.line)} are needed: the largest pressure may have "
+                f"an error of {peak_error(min(across)):.1%}: give the contact a finer grid"
             )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import ceil
 from typing import Any
 
-from sa_solver.surfaces.resolution import cells_across, fewest_across, is_point, peak_error
+from sa_solver.surfaces.resolution import fewest_across, is_point, peak_error, too_few_across
 from sa_solver.types import Array, Grid
 from workflow.case.text.readable import percent
 from workflow.errors import UserError
@@ -38,8 +38,8 @@ def check_cells(
     run is almost finished by then, so a warning is given instead.
     """
     pressed, enough = pressure > 0.0, fewest_across(grid.line)
-    across = cells_across(pressed)[: 1 if grid.line else 2]
-    if min(across) >= enough or not pressed.any():
+    across = too_few_across(pressed, grid.line)
+    if not across:
         return
     given = settings.grid
     factors = [MARGIN * enough / count if count < enough else 1.0 for count in across]
