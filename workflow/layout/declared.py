@@ -37,6 +37,10 @@ class Declared(NamedTuple):
         """Return the unit in a contact over an area or in a ``line`` contact."""
         return (line and self.line_unit) or unit_in(line, self.unit)
 
+    def over(self, *dims: str) -> Declared:
+        """Return the same dataset with further dimensions, which come first."""
+        return self._replace(dims=(*dims, *self.dims))
+
     def variable(self, values: NDArray[Any], line: bool = False) -> xr.Variable:
         """Return values as a variable of xarray, with unit and description."""
         import xarray as xr

@@ -344,7 +344,7 @@ def few_cells_warnings(
             yield (
                 f"{stage.name}: the contact is only {' x '.join(map(str, across))} cells across, "
                 f"and {fewest_across(stage.grid.line)} are needed: the largest pressure may have "
-                f"an error of {peak_error(min(across)):.1%}: give the contact a finer grid"
+                f"an error of {100.0 * peak_error(min(across)):.1f} %: give it a finer grid"
             )
 
 

@@ -209,8 +209,8 @@ def _shared_grid(grids: Mapping[str, Cells]) -> Cells:
 def _other_grid(own: Cells, of_model: Cells, line: bool) -> Cells | None:
     """Return the grid to compare ``own`` with, or None if it would have too few cells.
 
-    Strips are those of the model if these are fewer and resolve edges less, else twice as many. In
-    space there are half as many cells along each direction.
+    Line contacts have the cells of the model if these are fewer and resolve edges less, else twice
+    as many. In 3-D there are half as many cells along each direction.
     """
     if line:
         return of_model[0] if of_model[0] < own[0] else 2 * own[0], own[1]

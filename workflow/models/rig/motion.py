@@ -145,7 +145,7 @@ class MotionModel:
             motion = self.motion(steps, reached)
         if motion.error > LARGEST_ERROR:
             warnings.warn(
-                f"the time steps cause an error of {motion.error:.1%} of the largest "
+                f"the time steps cause an error of {100.0 * motion.error:.1f} % of the largest "
                 "displacement: take shorter ones",
                 ModelWarning,
                 stacklevel=2,

@@ -108,6 +108,24 @@ class InterfaceStress:
         )
 
     @property
+    def carried_warning(self) -> str:
+        """Warning about the stress that a structure carries past the contact; empty without one."""
+        if not self.bulk:
+            return (
+                f"{self.name}: too few nodes near the contact to know what the structure carries "
+                "beyond the contact: the stress under it is that of its tractions alone; refine "
+                "the mesh there"
+            )
+        if not self.uncertain:
+            return ""
+        return (
+            f"{self.name}: what the structure carries beyond the contact is uncertain by "
+            f"{100.0 * self.uncertain:.1f} % of the deformation of half-spaces, and the stress "
+            "under it may be wrong by as much, and twice as much near the ends of the face: "
+            "refine the mesh of the contact face"
+        )
+
+    @property
     def mapped(self) -> bool:
         """True if there are maps of the fretting parameter."""
         return all(body.maps for body in self._bodies)

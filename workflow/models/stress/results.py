@@ -72,25 +72,16 @@ class StressResults:
         for stress in self.contacts:
             if (stuck := stress.stuck[peak]) > STUCK_SHARE:
                 yield (
-                    f"{stress.name}: {stuck:.0%} of the peak load sticks, and method normal does "
-                    "not know its shear, which section and life lack: use method full"
+                    f"{stress.name}: {100.0 * stuck:.0f} % of the peak load sticks, and method "
+                    "normal does not know its shear, which section and life lack: use method full"
                 )
             elif count := int((stress.stuck > STUCK_SHARE).sum()):
                 yield (
                     f"{stress.name}: the life leaves out {count} increments, in which method "
                     "normal does not know the shear of a contact that sticks: use method full"
                 )
-            if self.structure is not None and not stress.bulk:
-                yield (
-                    f"{stress.name}: too few nodes near the contact to know what the structure "
-                    "carries past it: the stress is that of the tractions alone; refine the mesh"
-                )
-            elif stress.uncertain:
-                yield (
-                    f"{stress.name}: what the structure carries past the contact is uncertain by "
-                    f"{stress.uncertain:.1%} of the deformation of half-spaces: refine the mesh of "
-                    "the contact face"
-                )
+            if self.structure is not None and stress.carried_warning:
+                yield stress.carried_warning
 
 
 def _section(stress: InterfaceStress) -> xr.Dataset:
@@ -145,8 +136,7 @@ def _of_bodies(text: str, values: Mapping[str, Array]) -> dict[str, xr.Variable]
     """Return values of all moments and bodies as variables, as the ``text`` declares them."""
     described = declared(text)
     return {
-        name: (own := described[name])._replace(dims=(STATE, BODIES, *own.dims)).variable(array)
-        for name, array in values.items()
+        name: described[name].over(STATE, BODIES).variable(array) for name, array in values.items()
     }
 
 
@@ -163,8 +153,7 @@ def _body(bodies: Sequence[Body], fields: Sequence[StressField]) -> xr.Dataset:
         "maximum_principal": np.array([field.maximum_principal for field in fields]),
     }
     variables = {
-        name: (own := described[name])._replace(dims=(STATE, *own.dims)).variable(values)
-        for name, values in of_states.items()
+        name: described[name].over(STATE).variable(values) for name, values in of_states.items()
     }
     notches = [field.notch for field in fields if field.notch is not None]
     if len(notches) == len(fields):
@@ -184,6 +173,5 @@ def _notch(notches: list[PeakStress]) -> dict[str, xr.Variable]:
         "notch_place": [notch.place for notch in notches],
     }
     return {
-        name: (own := NOTCH[name])._replace(dims=(STATE, *own.dims)).variable(np.array(array))
-        for name, array in values.items()
+        name: NOTCH[name].over(STATE).variable(np.array(array)) for name, array in values.items()
     }

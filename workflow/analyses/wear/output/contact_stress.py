@@ -116,12 +116,12 @@ def report_stress(
     """Report what the stress under the contacts lacks; ``peak`` is the increment of peak load."""
     _report_stick(np.array([stress.stuck for stress in stresses]), peak, reporter)
     for stress in stresses:
-        if with_structure:
-            _report_carried(stress, reporter)
-        else:
+        if not with_structure:
             reporter.log(
                 f"{stress.name}: the stress under the contact is that of its tractions alone"
             )
+        elif stress.carried_warning:
+            reporter.warn(stress.carried_warning)
 
 
 def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
@@ -137,21 +137,4 @@ def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
         reporter.warn(
             f"stress.life leaves out {count} of {len(worst)} increments, in which up to "
             f"{percent(worst.max())} of the load sticks: {why}"
-        )
-
-
-def _report_carried(stress: InterfaceStress, reporter: Reporter) -> None:
-    """Warn if the stress carried past a contact is unknown or inaccurate."""
-    if not stress.bulk:
-        reporter.warn(
-            f"{stress.name}: too few nodes near the contact to know what the structure carries "
-            "beyond the contact: the stress under it is that of its tractions alone; refine the "
-            "mesh there"
-        )
-    elif stress.uncertain:
-        reporter.warn(
-            f"{stress.name}: what the structure carries beyond the contact is uncertain by "
-            f"{percent(stress.uncertain)} of the deformation of half-spaces, and the stress under "
-            "it may be wrong by as much, and twice as much near the ends of the face: refine the "
-            "mesh of the contact face"
         )
