@@ -23,8 +23,12 @@ PATIENCE = 120.0
 ROOT = Path(__file__).resolve().parents[3]
 COMMAND = "from workflow.cli import main; main()"
 FULL = Path("/dev/full")
-# Files may grow to so many bytes; what is written beyond fails, as on a full disk.
-LIMITED = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}));" + COMMAND
+# Files may grow to so many bytes; what is written beyond fails, as on a full disk. Python must not
+# write compiled modules then: it would leave cut off ones, which break later imports.
+LIMITED = (
+    "import os, resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0})); "
+    "sys.dont_write_bytecode = True; os.environ['PYTHONDONTWRITEBYTECODE'] = '1'; " + COMMAND
+)
 ARRAYS = {f"field_{number}": np.full((40, 50), 1.0 * number) for number in range(20)}
 
 posix_only = pytest.mark.skipif(os.name != "posix", reason="limits and streams of POSIX")
@@ -93,7 +97,8 @@ def test_two_files_of_one_name_are_written_at_the_same_time(tmp_path):
 
 
 FILLING = """
-import resource, numpy as np
+import resource, sys, numpy as np
+sys.dont_write_bytecode = True
 from pathlib import Path
 from workflow.shell.folders.store import write_arrays
 resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))
