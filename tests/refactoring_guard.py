@@ -118,7 +118,8 @@ class Recorder:
             (self.inputs / name).write_text(text, encoding="utf-8")
         write_boxes(self.inputs)
         angle = np.linspace(0.0, 6.0 * np.pi, 601)
-        loop = np.column_stack([7.0 * np.sin(angle), 30.0 * np.tanh(4.0 * np.cos(angle))])
+        # The force changes sign only after a reversal, as that of an elastic joint that slides.
+        loop = np.column_stack([7.0 * np.sin(angle), 30.0 * np.tanh(4.0 * np.cos(angle - 0.5))])
         header = "displacement [um],force [N]"
         np.savetxt(self.inputs / "measured.csv", loop, delimiter=",", header=header, comments="")
 
