@@ -93,6 +93,7 @@ def reference(case: Path) -> dict[str, bytes]:
     return arrays(out)
 
 
+@pytest.mark.slow
 def test_processes_run_in_folders_of_any_name(case, reference, tmp_path):
     """The program, its case and its results may lie in folders with blanks and any letters."""
     place = tmp_path / "Reibung & Verschleiß, 微动 'magnétique'"
@@ -112,6 +113,7 @@ def test_processes_run_in_folders_of_any_name(case, reference, tmp_path):
     assert arrays(results.parent) == reference
 
 
+@pytest.mark.slow
 def test_nothing_needs_a_module_that_windows_lacks(case, reference, tmp_path):
     run(WITHOUT, "run", case, "--out", tmp_path / "out", path=(ROOT, FACADE), cwd=tmp_path)
     assert arrays(tmp_path / "out") == reference
