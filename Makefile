@@ -95,5 +95,6 @@ $(PYHARM):
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
 	    .hypothesis docs/_build docs/reference/cases docs/reference/libraries \
+	    docs/reference/messages \
 	    docs/gallery/index.md
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -52,6 +52,7 @@ extensions = [
     "case_reference",
     "gallery_page",
     "library_reference",
+    "message_reference",
 ]
 exclude_patterns = ["_build", "**.ipynb_checkpoints"]
 nitpicky = True

@@ -439,6 +439,16 @@ def materials() -> None:
 
 
 @cli.command()
+@click.argument("code", required=False)
+def explain(code: str | None) -> None:
+    """Explain the CODE of a warning or an error, such as FS-W102; without CODE list all."""
+    from workflow.commands.explain import explained
+
+    for name, text in explained(code):
+        click.echo(_fitted(f"{name:<9} {text}", indent=10))
+
+
+@cli.command()
 def schema() -> None:
     """Print the JSON schema of a case, a sweep or a fit, for editors."""
     import json

@@ -9,6 +9,8 @@ from __future__ import annotations
 import errno
 
 from sa_solver.errors import FretscaleError, InputError
+from workflow.messages.error_kinds import error_kind
+from workflow.messages.warning_kinds import WarningKind
 
 DONE = 0
 INTERRUPTED = 130
@@ -50,10 +52,34 @@ class EntryError(UserError):
         return f"{self.key}: {self.message}"
 
 
+class FolderInUse(UserError):
+    """Folder in which another process computes."""
+
+
+class FolderTaken(UserError):
+    """Folder or file that exists, and would be overwritten."""
+
+
+class RunChanged(UserError):
+    """Stored run whose files are missing, changed, damaged or of another version."""
+
+
+class TooCoarse(UserError):
+    """Contact on a single point of its grid or mesh."""
+
+
 class MethodFailed(Ending):
     """Numerical method that did not converge; the message has its residual and a remedy."""
 
     exit_code = 3
+
+
+class ProcessLost(MethodFailed):
+    """Process of a run that ended unexpectedly."""
+
+
+class ClusterLost(MethodFailed):
+    """Scheduler or workers of a cluster that are gone."""
 
 
 class NotWritten(Ending):
@@ -84,5 +110,25 @@ def one_line(printed: object) -> str:
     return " ".join(str(printed).split())
 
 
+def marked_line(error: FretscaleError) -> str:
+    """Return the message of an error in one line, with its code at the end."""
+    return error_kind(error).marked(one_line(error))
+
+
 class ModelWarning(UserWarning):
-    """Warning about a model whose results are computed, but may be wrong."""
+    """Warning about a model whose results are computed, but may be wrong.
+
+    ``code`` is its code, such as ``FS-W102``, which ``fretscale explain`` explains.
+    """
+
+    def __init__(self, kind: WarningKind, text: str) -> None:
+        super().__init__(kind, text)
+        self.kind, self.text = kind, text
+
+    def __str__(self) -> str:
+        return self.kind.marked(self.text)
+
+    @property
+    def code(self) -> str:
+        """Code of the warning."""
+        return self.kind.code

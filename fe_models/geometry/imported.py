@@ -65,6 +65,8 @@ class ImportedMesh:
         Axes of the file that the bodies have: all, or the two of a plane.
     unit
         Unit of length of the file; lengths here are in mm.
+    remarks
+        Messages that the library which reads the file has printed.
 
     Examples
     --------
@@ -98,6 +100,7 @@ class ImportedMesh:
     scene: Scene = field(default_factory=Scene)
     axes: tuple[int, ...] = (0, 1, 2)
     unit: LengthUnit = field(default_factory=LengthUnit)
+    remarks: tuple[str, ...] = ()
 
     @cached_property
     def set_faces(self) -> dict[str, dict[str, Indices]]:
@@ -276,7 +279,8 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
             lines.append(
                 f"  node set {points}: {len(vertices)} nodes{form}, centroid {vector(centre)} mm"
             )
-    return lines + [f"not taken over: {line}" for line in imported.unused]
+    lines += [f"not taken over: {line}" for line in imported.unused]
+    return lines + [f"the reader reports: {remark}" for remark in imported.remarks]
 
 
 def extent(points: Array) -> str:
@@ -345,6 +349,7 @@ def _separated(grouped: GroupedMesh) -> ImportedMesh:
         scene=grouped.scene,
         axes=tuple(axes.tolist()),
         unit=grouped.unit,
+        remarks=grouped.remarks,
     )
 
 

@@ -72,6 +72,8 @@ class GroupedMesh:
         Materials, contacts, supports and loads of the file.
     unit
         Unit of length of the file.
+    remarks
+        Messages that the library which reads the file has printed.
     """
 
     points: Array
@@ -83,6 +85,7 @@ class GroupedMesh:
     unused: tuple[str, ...] = ()
     scene: Scene = field(default_factory=Scene)
     unit: LengthUnit = field(default_factory=LengthUnit)
+    remarks: tuple[str, ...] = ()
 
     def in_millimetres(self) -> GroupedMesh:
         """Return the mesh with lengths in mm, and its scene in N, mm and t."""

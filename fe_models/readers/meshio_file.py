@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-import warnings
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,7 @@ def read_meshio(path: Path) -> GroupedMesh:
     without boundaries. Nodes are numbered from zero in the order of the file. Raises
     :class:`MeshError`.
     """
-    mesh = _read(path)
+    mesh, remarks = _read(path)
     shapes = [_shape(path, block.type) for block in mesh.cells]
     full = [np.asarray(block.data, dtype=np.int64) for block in mesh.cells]
     cells = [nodes[:, : CORNERS[shape]] for nodes, shape in zip(full, shapes, strict=True)]
@@ -70,11 +69,12 @@ def read_meshio(path: Path) -> GroupedMesh:
         surfaces=named[top - 1] if top > 0 else {},
         node_sets=_node_sets(mesh, named[: max(top - 1, 0)]),
         midsides=midsides_of(points, zip(shapes, full, strict=True)),
+        remarks=remarks,
     )
 
 
-def _read(path: Path) -> Any:
-    """Return meshio's mesh of the file; meshio's output becomes the error or a warning."""
+def _read(path: Path) -> tuple[Any, tuple[str, ...]]:
+    """Return meshio's mesh of the file and its output, which becomes the error if it fails."""
     import meshio
 
     for kind in ("wedge15", "pyramid13"):  # meshio reads these but lacks their dimension.
@@ -88,9 +88,8 @@ def _read(path: Path) -> Any:
         reason = output.getvalue() if isinstance(error, SystemExit) else str(error)
         reason = " ".join(reason.split()) or type(error).__name__
         raise MeshError(f"{path}: meshio cannot read it: {reason}") from None
-    if output.getvalue().strip():
-        warnings.warn(f"{path}: meshio: {' '.join(output.getvalue().split())}", stacklevel=3)
-    return mesh
+    printed = " ".join(output.getvalue().split())
+    return mesh, (f"meshio: {printed}",) if printed else ()
 
 
 def _shape(path: Path, kind: str) -> str:

@@ -17,6 +17,7 @@ from fe_models.dynamics import (
 )
 from sa_solver.errors import InputError
 from wear.joints import Jenkins
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.folders import steps
 
 MASS, SPRING, FORCE, FREQUENCY = 1e-3, 1e3, 10.0, 50.0
@@ -55,7 +56,7 @@ def test_a_sliding_joint_dissipates_what_its_force_moves(model):
 
 
 def test_long_steps_give_a_warning(model):
-    with pytest.warns(fretscale.ModelWarning, match="time steps"):
+    with pytest.warns(fretscale.ModelWarning, match=WarningKind.LONG_TIME_STEPS.code):
         replace(model, control=TimeStepControl(1e-3)).run()
 
 

@@ -11,6 +11,7 @@ import xarray
 from fe_models.dynamics import Accuracy, HarmonicBalance, Link, Resolution, lumped_rig
 from tests.conftest import CASES
 from wear.joints import Jenkins
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.vibration.results import LARGEST_ERROR
 from workflow.shell.folders import steps
 
@@ -105,8 +106,9 @@ def test_an_interrupted_curve_goes_on_from_its_checkpoint(model, tmp_path, monke
 
 def test_a_curve_without_resonance_gives_a_warning(model):
     below = replace(model, sweep=fretscale.FrequencySweep(100.0, 120.0))
-    with pytest.warns(fretscale.ModelWarning, match=r"0\.1 N"):
+    with pytest.warns(fretscale.ModelWarning, match=r"0\.1 N") as reported:
         below.run()
+    assert WarningKind.NO_RESONANCE.code in [each.message.code for each in reported]
 
 
 def test_motions_less_accurate_than_asked_for_give_a_warning(model):
@@ -120,7 +122,7 @@ def test_motions_less_accurate_than_asked_for_give_a_warning(model):
         warnings.simplefilter("error")
         error = replace(few, sweep=within(0.5)).run()["100 N"].attrs["error"]
     assert 1e-4 < error < LARGEST_ERROR
-    with pytest.warns(fretscale.ModelWarning, match="100 N"):
+    with pytest.warns(fretscale.ModelWarning, match=WarningKind.INACCURATE_MOTION.code):
         replace(few, sweep=within(0.5 * error)).run()
 
 

@@ -15,6 +15,7 @@ from tests.conftest import CASES
 from wear import EnergyLaw
 from wear.evolution import CoulombFriction, EnergyTable
 from workflow.analyses.wear.model import wear_model
+from workflow.messages.warning_kinds import WarningKind
 
 ROOT = CASES.parent
 SCRIPTS = ROOT / "docs" / "scripts"
@@ -209,7 +210,7 @@ def test_a_contact_at_the_border_is_warned_of(model):
 
     still = fretscale.Wear(cycles=10.0, motion="neglect")
     small = fretscale.WearModel(Small(), model.contacts, still)
-    with pytest.warns(UserWarning, match="pad: the contact touches the border of its grid"):
+    with pytest.warns(fretscale.ModelWarning, match=WarningKind.CONTACT_AT_BORDER.code):
         small.run()
 
 

@@ -9,6 +9,7 @@ import pytest
 from fe_models.geometry import Specimen
 from sa_solver import InputError, LoadHistory, Material
 from wear import ArchardLaw, CycleLoads, EnergyLaw
+from workflow.messages.warning_kinds import WarningKind
 
 TITANIUM, LAW = Material(115e3, 0.29), EnergyLaw(1e-8)
 STROKE = fretscale.LoadTable.stroke(P=50.0, stroke=0.02)
@@ -105,7 +106,7 @@ def test_an_observer_is_given_in_a_list():
 
 @pytest.mark.parametrize("cells", [(32, 1), (32, 8)])
 def test_a_contact_of_few_cells_is_warned_of(cells):
-    with pytest.warns(fretscale.ModelWarning, match="10 are needed"):
+    with pytest.warns(fretscale.ModelWarning, match=WarningKind.FEW_CELLS.code):
         model(of=contact(grid=cells)).run()
 
 

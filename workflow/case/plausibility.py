@@ -19,6 +19,7 @@ from sa_solver.types import Array
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case, entry_of
 from workflow.case.text.plain import between, display_unit, plain
+from workflow.messages.warning_kinds import Notice, WarningKind
 
 # Aspect ratio of cells above which a grid wastes most of them.
 SQUARE = 5.0
@@ -117,14 +118,14 @@ MEANT: dict[str, tuple[tuple[str, float], ...]] = {
 }
 
 
-def plausibility_warnings_of(case: Case) -> Iterator[str]:
+def plausibility_warnings_of(case: Case) -> Iterator[Notice]:
     """Yield a plausibility warning for each value, or combination of values, that is unlikely."""
     yield from _unusual(case)
     yield from _hardly_round(case)
     yield from case.plausibility_warnings()
 
 
-def _unusual(case: Case) -> Iterator[str]:
+def _unusual(case: Case) -> Iterator[Notice]:
     """Yield a warning for each value outside its usual range, with the range and a likely unit."""
     for path, number, quantity in _quantities(case):
         usual = next(
@@ -133,18 +134,20 @@ def _unusual(case: Case) -> Iterator[str]:
         if usual is None or number == 0.0 or usual.low <= abs(number) <= usual.high:
             continue
         value, range_text = plain(number, usual.unit), between(usual.low, usual.high, usual.unit)
-        yield f"{path}: {value}; usual: {range_text}{_question(abs(number), usual)}"
+        text = f"{path}: {value}; usual: {range_text}{_question(abs(number), usual)}"
+        yield Notice(WarningKind.UNUSUAL_VALUE, text)
 
 
-def _hardly_round(section: BaseModel, path: str = "") -> Iterator[str]:
+def _hardly_round(section: BaseModel, path: str = "") -> Iterator[Notice]:
     """Yield warnings about rounded edges and ends of faces in a section that are nearly flat."""
     for name in ("edge", "end"):
         width, radius = (getattr(section, f"{name}_{of}", None) for of in ("width", "radius"))
         if width is not None and radius is not None and 0.5 * width**2 / radius < ROUND:
-            yield (
+            yield Notice(
+                WarningKind.UNUSUAL_LENGTH,
                 f"{path}{name}_radius: {plain(radius, 'mm')} over {name}_width "
                 f"{plain(width, 'mm')} gives a rounding only "
-                f"{plain(0.5 * width**2 / radius, 'mm', 3)} deep: are the units right?"
+                f"{plain(0.5 * width**2 / radius, 'mm', 3)} deep: are the units right?",
             )
     for name in type(section).model_fields:
         value = getattr(section, name)
@@ -180,41 +183,45 @@ def _question(number: float, usual: Usual) -> str:
     return ""
 
 
-def uneven_cells(sides: tuple[float, float], cells: tuple[int, int]) -> Iterator[str]:
+def uneven_cells(sides: tuple[float, float], cells: tuple[int, int]) -> Iterator[Notice]:
     """Yield a warning if the cells of an area grid are far from square."""
     if 1 in cells:
         return
     dx, dy = (side / count for side, count in zip(sides, cells, strict=True))
     ratio = max(dx / dy, dy / dx)
     if ratio > SQUARE:
-        yield (
+        yield Notice(
+            WarningKind.LONG_CELLS,
             f"contact.grid: cells of {plain(dx, 'mm', 4)} x {plain(dy, 'mm', 4)} are {ratio:.0f} "
-            "times longer than wide; usual: nearly square"
+            "times longer than wide; usual: nearly square",
         )
 
 
 def pressed(
     path: str, pressure: float, yields: Iterable[float | None], moduli: Iterable[float] = ()
-) -> Iterator[str]:
+) -> Iterator[Notice]:
     """Yield a warning if ``pressure`` [MPa] is implausible for these yield stresses [MPa].
 
     If no yield stress is known, Young's ``moduli`` [MPa] give the limit.
     """
     if 0.0 < pressure < WEAK:
-        yield (
+        yield Notice(
+            WarningKind.UNUSUAL_LOAD,
             f"{path}: gives a pressure of only about {plain(pressure, 'MPa', 3)}: is its unit "
-            "right?"
+            "right?",
         )
     limits = [limit for limit in yields if limit is not None]
     if limits and pressure > BEYOND * min(limits):
-        yield (
+        yield Notice(
+            WarningKind.UNUSUAL_LOAD,
             f"{path}: gives a pressure of about {plain(pressure, 'MPa', 3)}, "
-            f"{pressure / min(limits):.0f} times the yield stress: is its unit right?"
+            f"{pressure / min(limits):.0f} times the yield stress: is its unit right?",
         )
     elif pressure > STRENGTH * min(moduli, default=np.inf):
-        yield (
+        yield Notice(
+            WarningKind.UNUSUAL_LOAD,
             f"{path}: gives a pressure of about {plain(pressure, 'MPa', 3)}, more than any "
-            "material with such a Young's modulus bears: is its unit right?"
+            "material with such a Young's modulus bears: is its unit right?",
         )
 
 
@@ -230,16 +237,17 @@ def hertz(load: float, radius: float, modulus: float, line: bool) -> tuple[float
     return half_width, 1.5 * load / (pi * half_width**2)
 
 
-def long_stroke(path: str, stroke: float, width: float) -> Iterator[str]:
+def long_stroke(path: str, stroke: float, width: float) -> Iterator[Notice]:
     """Yield a warning if the stroke [mm] is very large compared with the contact ``width`` [mm]."""
     if stroke > LONG * width:
-        yield (
+        yield Notice(
+            WarningKind.LONG_STROKE,
             f"{path}: {plain(stroke, 'mm')} is {stroke / width:.0f} times the width of the "
-            f"contact, about {plain(width, 'mm', 3)}: is its unit right?"
+            f"contact, about {plain(width, 'mm', 3)}: is its unit right?",
         )
 
 
-def heights(path: str, values: Array, sides: tuple[float, float]) -> Iterator[str]:
+def heights(path: str, values: Array, sides: tuple[float, float]) -> Iterator[Notice]:
     """Yield a warning if heights [mm] of a file are implausible for a face of these sides [mm]."""
     reach = float(np.ptp(values))
     if reach > STEEP * min(sides):
@@ -248,16 +256,18 @@ def heights(path: str, values: Array, sides: tuple[float, float]) -> Iterator[st
         other = "m"
     else:
         return
-    yield (
+    yield Notice(
+        WarningKind.UNUSUAL_LENGTH,
         f"{path}: heights over {plain(reach, 'mm', 3)} on a face of {plain(min(sides), 'mm')}; "
-        f"they are read in mm: are they in {other}?"
+        f"they are read in mm: are they in {other}?",
     )
 
 
-def idle_steps(path: str, step: float | None, cycles: float) -> Iterator[str]:
+def idle_steps(path: str, step: float | None, cycles: float) -> Iterator[Notice]:
     """Yield a warning if the wear step has more cycles than the whole run."""
     if step is not None and step > cycles:
-        yield (
+        yield Notice(
+            WarningKind.STEP_LONGER_THAN_RUN,
             f"{path}: {step:g} cycles, but the run has {cycles:g}: it makes one jump; usual: ten "
-            "or more"
+            "or more",
         )

@@ -41,6 +41,7 @@ from workflow.case.fields import (
 from workflow.case.materials import MATERIALS, near
 from workflow.case.source import Source
 from workflow.errors import EntryError, UserError
+from workflow.messages.warning_kinds import Notice
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
 Length = Annotated[float, Quantity("mm", above=0.0, at_most=1e4)]
@@ -362,10 +363,10 @@ class Case(Section, ABC):
     def outline(self) -> list[tuple[str, str]]:
         """Return what would run, in a few rows of name and text."""
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         """Yield a warning for each combination of entries that is possible but implausible.
 
-        Each line begins with one of the entries. Warnings about single entries are in
+        Each text begins with one of the entries. Warnings about single entries are in
         :mod:`workflow.case.plausibility`.
         """
         yield from ()

@@ -11,7 +11,7 @@ from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.length_unit import SIZES
 from workflow.case.fields import quantity_of_option
 from workflow.case.sections import Length
-from workflow.errors import UserError
+from workflow.errors import FolderTaken, UserError
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.lock import locked
 from workflow.shell.folders.store import replacing
@@ -54,7 +54,7 @@ def write_offer(
     from workflow.commands.offered_case import offered_case
 
     if case.exists() and not force:
-        raise UserError(f"{case}: exists; take another name, or --force to overwrite it")
+        raise FolderTaken(f"{case}: exists; take another name, or --force to overwrite it")
     offer = offered_case(imported, os.path.relpath(file, case.parent or "."), size)
     with replacing(case) as partial:
         partial.write_text(offer.text, encoding="utf-8")

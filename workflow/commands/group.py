@@ -17,13 +17,14 @@ import click
 
 from sa_solver.errors import FretscaleError
 from workflow import errors
+from workflow.messages.error_kinds import ErrorKind, error_kind
 
 # How to continue a command that was stopped.
 ADVICE = "continue a run with `fretscale resume DIR`, several with the same command"
 # Commands in the order and groups of the help.
 LISTED = {
     "A case": ("new", "check", "run", "resume"),
-    "Results": ("report", "compare"),
+    "Results": ("report", "compare", "explain"),
     "Many runs": ("sweep", "chart", "verify"),
     "Input and output": ("materials", "describe", "resultants", "surface", "schema"),
     "Measurements": ("loops", "scar", "fit"),
@@ -35,23 +36,25 @@ class OneLineGroup(click.Group):
 
     def main(self, *args: Any, **settings: Any) -> NoReturn:
         settings["standalone_mode"] = False
-        message = ""
+        message, kind = "", ErrorKind.REFUSED
         try:
             code = super().main(*args, **settings)
             if sys.stdout is not None:
                 sys.stdout.flush()
         except (FretscaleError, OSError, ImportError, MemoryError) as error:
-            message, code = _ending(error)
+            message, kind, code = _ending(error)
         except SystemExit as ended:
             if not ended.code:  # click has printed the shell completion of a command
                 raise
             # click and rich end this way when a pipe was closed.
-            message, code = _ending(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
+            message, kind, code = _ending(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
         except click.Abort as abort:
             left = f": {stop}" if (stop := abort.__cause__) and stop.args else ""
-            message, code = f"interrupted{left}", errors.INTERRUPTED
+            message, kind, code = f"interrupted{left}", ErrorKind.INTERRUPTED, errors.INTERRUPTED
         except click.ClickException as error:
             message, code = _usage(error), errors.UserError.exit_code
+        if message:
+            message = kind.marked(message)
         _say([f"fretscale: {line}" for line in message.splitlines()])
         sys.exit(code if isinstance(code, int) else errors.DONE)
 
@@ -81,25 +84,31 @@ def _say(lines: Sequence[str]) -> None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _ending(error: Exception) -> tuple[str, int]:
-    """Return the message about ``error``, one line per problem, and the exit code."""
+def _ending(error: Exception) -> tuple[str, ErrorKind, int]:
+    """Return the message about ``error``, one line per problem, its kind, and the exit code."""
     if isinstance(error, MemoryError):
-        return f"out of memory: {error}".rstrip(": "), errors.OutOfMemory.exit_code
+        message = f"out of memory: {error}".rstrip(": ")
+        return message, ErrorKind.OUT_OF_MEMORY, errors.OutOfMemory.exit_code
     if isinstance(error, FretscaleError):
-        return str(error), errors.exit_code(error)
+        return str(error), error_kind(error), errors.exit_code(error)
     if isinstance(error, BrokenPipeError) and error.filename is None:
-        return "", errors.NotWritten.exit_code  # as for `head`: the reader needs no more
+        return (
+            "",
+            ErrorKind.OUTPUT_FAILED,
+            errors.NotWritten.exit_code,
+        )  # as for `head`: the reader needs no more
     if isinstance(error, OSError) and error.errno in errors.UNWRITTEN:
         written = f"output: {error.strerror}"
         if error.filename is not None:
             written = f"{error.filename}: {error.strerror}; {ADVICE}"
-        return written, errors.NotWritten.exit_code
+        return written, ErrorKind.OUTPUT_FAILED, errors.NotWritten.exit_code
     from workflow.shell.system_check import remedy
 
     if missing := remedy(error):
-        return missing, errors.MethodFailed.exit_code
+        return missing, ErrorKind.PACKAGE_MISSING, errors.MethodFailed.exit_code
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}", errors.UserError.exit_code
+        message = f"{error.filename}: {error.strerror}"
+        return message, ErrorKind.FILE_UNUSABLE, errors.UserError.exit_code
     raise error
 
 

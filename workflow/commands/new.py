@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from workflow.errors import UserError
+from workflow.errors import FolderTaken, UserError
 from workflow.fit.template import FITS, fit_template
 from workflow.kinds import about, template
 from workflow.sweep.template import ABOUT, SWEEP, sweep_template
@@ -60,7 +60,7 @@ def write_new(kind: str, file: Path, short: bool = False) -> Path | None:
         with file.open("x", encoding="utf-8") as stream:
             stream.write(text)
     except FileExistsError:
-        raise UserError(f"{file}: exists; give another name or remove it") from None
+        raise FolderTaken(f"{file}: exists; give another name or remove it") from None
     if kind not in COMPANIONS:
         return None
     name, of_kind, more = COMPANIONS[kind]

@@ -16,6 +16,7 @@ from workflow.case.files.scan_files import NEAR, UNITS, read_scan
 from workflow.case.text.plain import plain
 from workflow.case.text.readable import percent
 from workflow.errors import UserError
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.lock import locked
 from workflow.shell.folders.store import replacing, write_text
@@ -109,28 +110,41 @@ def report(scar: Scar) -> list[str]:
         lines.append(
             f"{percent(scar.missing)} of the worn area are missing points, which are filled in"
         )
-    return [*lines, *_warnings_about(scar)]
+    return [*lines, *(f"warning: {warning}" for warning in _warnings_about(scar))]
 
 
-def _warnings_about(scar: Scar) -> list[str]:
+def _warnings_about(scar: Scar) -> list[Notice]:
     plausibility_warnings = []
     if (step := min(scar.pitch)) < NEAR:
         plausibility_warnings.append(
-            f"warning: points {plain(step, 'mm', 3)} apart: is their unit right?"
+            Notice(
+                WarningKind.UNUSUAL_LENGTH,
+                f"points {plain(step, 'mm', 3)} apart: is their unit right?",
+            )
         )
     if scar.patches is None:
         plausibility_warnings.append(
-            "warning: both scans agree around the worn area to the last digit, as no two "
-            "measurements do, so the error is unknown: are they one file, damaged, or computed?"
+            Notice(
+                WarningKind.UNCERTAIN_SCAR,
+                "both scans agree around the worn area to the last digit, as no two "
+                "measurements do, so the error is unknown: are they one file, "
+                "damaged, or computed?",
+            )
         )
     elif not scar.sure:
         plausibility_warnings.append(
-            "warning: the noise is correlated over so much of the rim that the errors are rough "
-            "at best: take scans that reach farther"
+            Notice(
+                WarningKind.UNCERTAIN_SCAR,
+                "the noise is correlated over so much of the rim that the errors are rough "
+                "at best: take scans that reach farther",
+            )
         )
     if scar.volume <= (scar.volume_error or 0.0):
         plausibility_warnings.append(
-            "warning: the volume does not differ from none: are the files in the right order?"
+            Notice(
+                WarningKind.NO_WORN_VOLUME,
+                "the volume does not differ from none: are the files in the right order?",
+            )
         )
     return plausibility_warnings
 

@@ -13,7 +13,7 @@ from sa_solver.types import Array, Grid
 from workflow.case.files.input_files import open_hdf5
 from workflow.case.files.scan_files import write_scan
 from workflow.case.sections import Case
-from workflow.errors import UserError
+from workflow.errors import FolderTaken, UserError
 from workflow.kinds import load_case
 from workflow.runs.provenance import case_values
 from workflow.shell.folders.folder import OutputFolder
@@ -30,7 +30,7 @@ def write_surface(
     instrument. Raises UserError.
     """
     if file.exists() and not force:
-        raise UserError(f"{file}: exists; allowed: another name, or --force")
+        raise FolderTaken(f"{file}: exists; allowed: another name, or --force")
     run = OutputFolder(folder)
     run.check_ended()
     run.check_results(case_values(run))

@@ -31,6 +31,7 @@ from workflow.case.units import to_base
 from workflow.errors import CaseError, UserError
 from workflow.fit.measured import MeasuredColumn, read_columns
 from workflow.fit.schema import FREE, FitInput, JointFit, WearFit
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.pictures.scales import TO_JOULES, TO_MICRONS
 
 # Columns that hold the parameters of a joint.
@@ -125,7 +126,7 @@ class Fitted:
     fit: Fit
     parameters: tuple[Parameter, ...]
     series: tuple[FittedSeries, ...]
-    plausibility_warnings: tuple[str, ...]
+    plausibility_warnings: tuple[Notice, ...]
     tests: Mapping[str, Common]
     reported: tuple[str, ...] = ()
     runs: Mapping[str, Any] = field(default_factory=dict)
@@ -163,7 +164,7 @@ def solved(
     fitted: Fit,
     paths: Sequence[tuple[str, str]],
     series: Sequence[FittedSeries],
-    notes: Sequence[str],
+    notes: Sequence[Notice],
     reported: Sequence[str] = (),
 ) -> Fitted:
     """Return the result of a fit whose parameters have these ``paths`` and units."""
@@ -179,19 +180,24 @@ def solved(
     for caveat in diagnose(fitted, order, files):
         named = _named([places[k] for k in caveat.data])
         where = f" ({named})" if named else ""
-        plausibility_warnings.append(
-            ": ".join(part for part in (caveat.series, caveat.text + where) if part)
-        )
+        text = ": ".join(part for part in (caveat.series, caveat.text + where) if part)
+        plausibility_warnings.append(Notice(WarningKind.CONSPICUOUS_RESIDUALS, text))
     plausibility_warnings += [
-        f"{parameter.path}: rests on one value, {places[e.heaviest]}; more there would help"
+        Notice(
+            WarningKind.RESTS_ON_ONE_VALUE,
+            f"{parameter.path}: rests on one value, {places[e.heaviest]}; more there would help",
+        )
         for parameter in parameters
         if (e := parameter.estimate).determined and e.heaviest_share > ALONE
     ]
     plausibility_warnings += _products(fitted, parameters)
     if fitted.reached < fitted.tried:
         plausibility_warnings.append(
-            f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit; the "
-            "best one is reported"
+            Notice(
+                WarningKind.WORSE_STARTS,
+                f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit; "
+                "the best one is reported",
+            )
         )
     tests = _tests(fitted, parameters, series, files)
     found = Fitted(
@@ -222,7 +228,7 @@ def _tests(
     return {path: one for path, one in found.items() if not path.startswith(own)}
 
 
-def _contradictions(fitted: Fitted) -> list[str]:
+def _contradictions(fitted: Fitted) -> list[Notice]:
     """Return warnings about parameters on which the files do not agree."""
     reported = []
     for path, common in fitted.tests.items():
@@ -235,9 +241,12 @@ def _contradictions(fitted: Fitted) -> list[str]:
                 if np.isfinite(own)
             )
             reported.append(
-                f"{path}: the files contradict each other beyond their scatter "
-                f"({values}{'' if unit == '1' else f' {unit}'}), so bounds of a common value are "
-                "too small: fit them separately, or ask what the tests differ in"
+                Notice(
+                    WarningKind.CONTRADICTING_FILES,
+                    f"{path}: the files contradict each other beyond their scatter "
+                    f"({values}{'' if unit == '1' else f' {unit}'}), so bounds of a common value "
+                    "are too small: fit them separately, or ask what the tests differ in",
+                )
             )
     return reported
 
@@ -248,7 +257,7 @@ def _named(places: Sequence[str]) -> str:
     return ", ".join(places[:MOST_NAMED]) + more
 
 
-def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[str]:
+def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[Notice]:
     """Return the products of pairs of parameters that only matter as a product."""
     names = [parameter.estimate.name for parameter in parameters]
     reported = []
@@ -259,7 +268,8 @@ def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[str]:
             value, deviation = map(other.shown, fitted.product(place, names.index(partner)))
             unit = "" if other.unit == "1" else f" {other.unit}"
             number = f"{parameter.shown(value):.5g}{unit} +- {parameter.shown(deviation):.2g}"
-            reported.append(f"{parameter.path} times {other.path} is {number}; hold one of them")
+            text = f"{parameter.path} times {other.path} is {number}; hold one of them"
+            reported.append(Notice(WarningKind.ONLY_A_PRODUCT, text))
     return reported
 
 
@@ -284,7 +294,10 @@ def fit_joint(given: FitInput, file: JointFit) -> Fitted:
             )
     columns, notes = _without_residual(file, columns)
     notes += [
-        f"{name}: not used where loops do not slide as a whole ({_named(column.left_out)})"
+        Notice(
+            WarningKind.DATA_LEFT_OUT,
+            f"{name}: not used where loops do not slide as a whole ({_named(column.left_out)})",
+        )
         for name, column in columns.items()
         if column.left_out
     ]
@@ -338,7 +351,7 @@ def _joint_path(name: str) -> tuple[str, str]:
 
 def _without_residual(
     file: JointFit, columns: dict[str, MeasuredColumn]
-) -> tuple[dict[str, MeasuredColumn], list[str]]:
+) -> tuple[dict[str, MeasuredColumn], list[Notice]]:
     """Return the columns with the stiffness as the law defines it, and notes about it."""
     if file.law == "bouc_wen" or "kt" not in columns:
         return columns, []
@@ -349,7 +362,7 @@ def _without_residual(
             f"kt has no residual_stiffness and is taken as the whole stiffness of {file.law}: "
             "right if nothing of it is left when all slides"
         )
-        return columns, [note]
+        return columns, [Notice(WarningKind.WHOLE_STIFFNESS, note)]
     alone = MeasuredColumn(
         kt.against, kt.values - residual, kt.deviations, kt.others, kt.places, kt.files
     )

@@ -17,6 +17,7 @@ from workflow.errors import UserError
 from workflow.fit.fitting import DISPLACEMENT, JOINT_UNITS, Fitted, FittedSeries, solved
 from workflow.fit.measured import MeasuredColumn
 from workflow.fit.schema import FREE, FitInput, LoopFitSection, LoopMeasurement
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.pictures.scales import TO_MICRONS
 
 
@@ -28,7 +29,7 @@ def fit_loops(given: FitInput, file: LoopFitSection) -> Fitted:
     held = {key: float(value) for key, value in entries.items() if value != FREE}
     names = [_loop_name(file, number) for number in range(1, len(file.measurements) + 1)]
     loops: list[LoopData] = []
-    reported, plausibility_warnings = [], []
+    reported, plausibility_warnings = [], list[Notice]()
     for name, one in zip(names, file.measurements, strict=True):
         measured = _measured(one)
         steps = _fitted_steps(measured)
@@ -38,7 +39,8 @@ def fit_loops(given: FitInput, file: LoopFitSection) -> Fitted:
             raise UserError(f"{one.file}: {error}") from error
         reported.append(f"{Path(one.file).name}: {account(measured)}")
         plausibility_warnings += [
-            f"{Path(one.file).name}: {text}" for text in _warnings_about(measured, len(steps))
+            Notice(kind, f"{Path(one.file).name}: {text}")
+            for kind, text in _warnings_about(measured, len(steps))
         ]
     try:
         problem = loop_problem(loops, file.joint.law, held)
@@ -84,13 +86,16 @@ def _fitted_steps(measured: MeasuredLoops) -> list[MeasuredLoops]:
     return [steps[place] for place in np.linspace(0, len(steps) - 1, count).round().astype(int)]
 
 
-def _warnings_about(measured: MeasuredLoops, fitted: int) -> list[str]:
+def _warnings_about(measured: MeasuredLoops, fitted: int) -> list[Notice]:
     """Return warnings about steps of a record that no single law can describe."""
-    steps, plausibility_warnings = measured.steps, []
+    steps, plausibility_warnings = measured.steps, list[Notice]()
     if fitted < len(steps):
         plausibility_warnings.append(
-            f"{fitted} of {len(steps)} steps of similar loops are fitted, from the first to "
-            "the last"
+            Notice(
+                WarningKind.DATA_LEFT_OUT,
+                f"{fitted} of {len(steps)} steps of similar loops are fitted, from the first to "
+                "the last",
+            )
         )
     strokes = np.array([step.stroke.mean() for step in steps])
     forces = np.array([step.force.mean() for step in steps])
@@ -102,9 +107,12 @@ def _warnings_about(measured: MeasuredLoops, fitted: int) -> list[str]:
         first = int(np.flatnonzero(same)[0])
         last = first + 1 + int(np.flatnonzero(same)[-1]) - first
         plausibility_warnings.append(
-            f"loops of one stroke change, from {forces[first]:.4g} N and {energies[first]:.4g} mJ "
-            f"to {forces[last]:.4g} N and {energies[last]:.4g} mJ: the joint wears or runs in, "
-            "and one law is a mean of its states; fit parts of the record separately"
+            Notice(
+                WarningKind.CHANGING_LOOPS,
+                f"loops of one stroke change, from {forces[first]:.4g} N and {energies[first]:.4g} "
+                f"mJ to {forces[last]:.4g} N and {energies[last]:.4g} mJ: the joint wears or runs "
+                "in, and one law is a mean of its states; fit parts of the record separately",
+            )
         )
     return plausibility_warnings
 

@@ -27,6 +27,7 @@ from workflow.fit.measured import PLACE, MeasuredColumn, read_columns
 from workflow.fit.profile_runs import Pair, RunScar, TestRuns, rounded
 from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.schema import FitInput
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.lock import locked
 from workflow.shell.terminal.reporter import Reporter
@@ -136,7 +137,7 @@ class _Search:
         fitted = self._fitted(scars, found)
         plausibility_warnings = (
             *fitted.plausibility_warnings,
-            *(f"the runs: {warning}" for warning in warned),
+            *(Notice(WarningKind.RUNS_WARNED, f"the runs: {warning}") for warning in warned),
         )
         return self._with_runs(
             replace(fitted, plausibility_warnings=plausibility_warnings),
@@ -231,11 +232,20 @@ class _Search:
             )
             if abs(finer) > TOO_COARSE * deviation:
                 plausibility_warnings.append(
-                    f"{parameter.path}: finer runs change it by {abs(finer) / deviation:.2g} "
-                    "standard deviations, which its bounds do not include; make the cases finer"
+                    Notice(
+                        WarningKind.TOO_FEW_RUNS,
+                        f"{parameter.path}: finer runs change it by {abs(finer) / deviation:.2g} "
+                        "standard deviations, which its bounds do not include; make the cases "
+                        "finer",
+                    )
                 )
         if not settled:
-            plausibility_warnings.append("runs are too few: leaving one out still changes the fit")
+            plausibility_warnings.append(
+                Notice(
+                    WarningKind.TOO_FEW_RUNS,
+                    "runs are too few: leaving one out still changes the fit",
+                )
+            )
         count = counted(len(self._runs.made), "run")
         return replace(
             fitted,

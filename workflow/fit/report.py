@@ -140,7 +140,7 @@ def summary(fitted: Fitted, section: str) -> dict[str, Any]:
         "excess": finite(found.excess),
         "starts": {"tried": found.tried, "reached": found.reached},
         **({"runs": dict(fitted.runs)} if fitted.runs else {}),
-        "doubts": list(fitted.plausibility_warnings),
+        "doubts": list(map(str, fitted.plausibility_warnings)),
         "section": section,
         "versions": versions(),
     }

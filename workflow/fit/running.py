@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from workflow.errors import UserError
+from workflow.errors import FolderTaken
 from workflow.fit.fitting import Fitted, fit_joint, fit_wear
 from workflow.fit.loops import fit_loops
 from workflow.fit.profile_schema import ProfileFit
@@ -42,7 +42,7 @@ def run_fit(
     """
     there = [] if out is None else [name for name in (*FILES, SUMMARY) if (out / name).exists()]
     if there and not force:
-        raise UserError(f"{out}/{there[0]}: exists; give another folder, or --force")
+        raise FolderTaken(f"{out}/{there[0]}: exists; give another folder, or --force")
     file = given.file
     if isinstance(file, ProfileFit):
         from workflow.fit.profiles import fit_profiles  # imports all solvers

@@ -116,7 +116,7 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
     memory.check()
     outline, plausibility_warnings = (
         (*loaded.outline(), *taken(loaded)),
-        tuple(plausibility_warnings_of(loaded)),
+        tuple(map(str, plausibility_warnings_of(loaded))),
     )
     return Check(
         loaded.title, outline, memory.required, time.seconds, time.text, plausibility_warnings

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from workflow.errors import UserError
+from workflow.errors import RunChanged, UserError
 from workflow.shell.output.results import DIMENSIONS, NO_COORDINATE, own
 
 if TYPE_CHECKING:
@@ -59,7 +59,9 @@ class Group(Mapping[str, "Group | xr.DataArray"]):
     def _reading(self) -> Iterator[h5py.Group]:
         """Open the file for reading; raise :class:`UserError` if it has changed."""
         if not self._path.exists() or _written(self._path) != self._written:
-            raise UserError(f"{self._path}: replaced or removed since it was opened; open it again")
+            raise RunChanged(
+                f"{self._path}: replaced or removed since it was opened; open it again"
+            )
         with h5py.File(self._path) as file:
             yield file[self.name or "/"]
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from workflow.errors import UserError
+from workflow.errors import RunChanged, UserError
 from workflow.shell.folders.steps import Place, StoredSteps, joined, outermost, unjoined
 from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
 
@@ -38,10 +38,10 @@ class FileSteps(StoredSteps):
         try:
             arrays, attributes = read_arrays(self._path)
             if attributes[MODEL] != self._model:
-                raise UserError(f"{self._path}: of another model; remove it, or name another file")
+                raise RunChanged(f"{self._path}: of another model; remove it, or name another file")
             finished, marches = (_unjoined(arrays, group) for group in (FINISHED, MARCHES))
         except DamagedFile as error:
-            raise UserError(str(error)) from error
+            raise RunChanged(str(error)) from error
         except KeyError as error:
             raise self._of_another_version(error) from error
         return outermost(finished, marches), marches
@@ -57,7 +57,7 @@ class FileSteps(StoredSteps):
         write_arrays(self._path, arrays, {MODEL: self._model})
 
     def _of_another_version(self, wrong: object) -> UserError:
-        return UserError(f"{self._path}: not the steps of this version of fretscale ({wrong})")
+        return RunChanged(f"{self._path}: not the steps of this version of fretscale ({wrong})")
 
 
 def _unjoined(arrays: Mapping[str, Any], group: str) -> dict[Place, bytes]:

@@ -123,7 +123,7 @@ class FitResult:
     def __init__(self, fitted: Fitted) -> None:
         self._fitted = fitted
         self.section = section_of(fitted)
-        self.plausibility_warnings = fitted.plausibility_warnings
+        self.plausibility_warnings = tuple(map(str, fitted.plausibility_warnings))
         self.summary = summary(fitted, self.section)
 
     def __getitem__(self, path: str) -> FittedParameter:

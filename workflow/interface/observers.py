@@ -13,7 +13,7 @@ import numpy as np
 
 from sa_solver.steps import Steps
 from wear.coupled_state import CoupledState, Observer
-from workflow.errors import UserError
+from workflow.errors import RunChanged, UserError
 from workflow.shell.folders.packing import PackingError, packed, unpacked
 from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
 
@@ -115,9 +115,9 @@ class Checkpoint(Observer):
             arrays, _ = read_arrays(self.path)
             state: CoupledState = unpacked(arrays[STATE].tobytes())
         except DamagedFile as error:
-            raise UserError(str(error)) from error
+            raise RunChanged(str(error)) from error
         except (KeyError, PackingError) as error:
-            raise UserError(f"{self.path}: not a state of this version of fretscale") from error
+            raise RunChanged(f"{self.path}: not a state of this version of fretscale") from error
         return state
 
     def steps(self, model: VibrationModel | MotionModel) -> Steps:

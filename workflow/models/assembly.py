@@ -32,6 +32,7 @@ from fe_models.structure import Structure
 from sa_solver.errors import InputError
 from sa_solver.surfaces.shapes import PARTING_SLOPE
 from sa_solver.types import Array, Indices, Material
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.faces import face_size, planes_of_symmetry
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
@@ -283,8 +284,7 @@ class MeshAssembly:
         if unit.size != 1.0:
             yield Remark(
                 f"lengths of the mesh file are {unit}; worn.msh, worn_nodes and ParaView files are "
-                "in mm",
-                is_warning=False,
+                "in mm"
             )
         for interface in structure.mesh.interfaces:
             name, planes = interface.name, interface.planes
@@ -292,15 +292,15 @@ class MeshAssembly:
                 yield Remark(
                     f"{name}: cut by {planes_of_symmetry(planes)}: its half-space has the mirror "
                     "image too, and all results of the contact are those of the whole face; "
-                    "worn.msh and worn_nodes are the meshed part",
-                    is_warning=False,
+                    "worn.msh and worn_nodes are the meshed part"
                 )
             elif name in structure.held_faces:
                 yield Remark(
                     f"{name}: supports hold some of its nodes along it, but not as a plane of "
                     "symmetry does (across x or y of the contact, with all nodes of both bodies "
                     "there); the half-space does not know of this, and its pressure is that of a "
-                    "face that ends there: mesh the whole face"
+                    "face that ends there: mesh the whole face",
+                    WarningKind.SUPPORT_ON_FACE,
                 )
 
 

@@ -29,6 +29,7 @@ from wear.steps.step_errors import ErrorControl, step_errors
 from wear.steps.steppers import ExplicitStepper, Stepper
 from wear.steps.stepping import WearingContact, WearState
 from wear.surfaces import Surfaces
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.loads import ContactFace
 
 WearStepper = Stepper[WearState, WearingContact]
@@ -305,11 +306,12 @@ class FaceContact:
         return contact.solve(gap, **load, start=None, compliance=None).pressure
 
     @property
-    def border_warning(self) -> str:
+    def border_warning(self) -> Notice:
         """Warning for a contact that is cut off by the border of its grid."""
-        return (
+        return Notice(
+            WarningKind.CONTACT_AT_BORDER,
             f"{self.name}: the contact touches the border of its grid, where it is cut off: "
-            f"{self._contact_face.remedy}"
+            f"{self._contact_face.remedy}",
         )
 
     def transfer_of(self, body: Literal[1, 2]) -> FaceTransfer:
@@ -337,18 +339,21 @@ WornFaces = Sequence[tuple[FaceContact, FaceState]]
 
 def few_cells_warnings(
     stages: Sequence[FaceContact], first: Sequence[FirstContact], peak: int
-) -> Iterator[str]:
+) -> Iterator[Notice]:
     """Yield the warnings for contacts that cover too few cells at the ``peak`` load, unworn."""
     for stage, found in zip(stages, first, strict=True):
         if across := too_few_across(found.pressure[peak] > 0.0, stage.grid.line):
-            yield (
+            yield Notice(
+                WarningKind.FEW_CELLS,
                 f"{stage.name}: the contact is only {' x '.join(map(str, across))} cells across, "
                 f"and {fewest_across(stage.grid.line)} are needed: the largest pressure may have "
-                f"an error of {100.0 * peak_error(min(across)):.1f} %: give it a finer grid"
+                f"an error of {100.0 * peak_error(min(across)):.1f} %: give it a finer grid",
             )
 
 
-def border_warnings(stages: Sequence[FaceContact], first: Sequence[FirstContact]) -> Iterator[str]:
+def border_warnings(
+    stages: Sequence[FaceContact], first: Sequence[FirstContact]
+) -> Iterator[Notice]:
     """Yield the warnings for contacts that touch the border of their grid in the first cycle."""
     for stage, found in zip(stages, first, strict=True):
         if found.touches_border:

@@ -18,6 +18,7 @@ from fe_models.structure import Structure
 from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Material
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.budget.convergence import MESH_ORDER, share_of_difference
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
@@ -239,15 +240,15 @@ class DovetailJoint:
         if moments and self.sides == "guided" and self.geometry.skew == 0.0:
             yield Remark(
                 "the sides of the disk's sector are guided, so they carry no moment; with "
-                "structure.sides: cyclic they move as those of the next sectors do",
-                is_warning=False,
+                "structure.sides: cyclic they move as those of the next sectors do"
             )
         slope, largest = float(np.tan(self.geometry.flank_angle)), max(friction)
         if largest > slope:
             yield Remark(
                 f"friction.coefficient {largest:g} exceeds the tangent of the flank angle, "
                 f"{slope:.3g}: the joint locks, and the blade does not move back when the load "
-                "falls"
+                "falls",
+                WarningKind.JOINT_LOCKS,
             )
 
 

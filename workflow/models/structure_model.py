@@ -15,6 +15,7 @@ from fe_models.loads.pretension import Bolt
 from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.structure import CycleSolution, Structure
 from sa_solver.types import Array, Indices
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.loads import ContactFace
 
 
@@ -56,10 +57,10 @@ class Nonlinearity:
 
 
 class Remark(NamedTuple):
-    """A remark about a structure: a warning, or something worth knowing."""
+    """A remark about a structure: a warning of a kind, or something worth knowing without one."""
 
     text: str
-    is_warning: bool = True
+    kind: WarningKind | None = None
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from wear.coupled_state import CoupledState, Observer, observed
 from wear.schedule import CoupledSettings
 from wear.steps.steppers import ROUNDING
 from workflow.errors import ModelWarning
+from workflow.messages.warning_kinds import Notice
 from workflow.models.contact import (
     Contact,
     FaceContact,
@@ -203,14 +204,14 @@ class WearModel:
             recorder = ResultsRecorder(contacts, loads.peak)
             loop = self.loop(loads, contacts, [*observers, recorder])
             state, first = self.begin(loop, unworn, start)
-            for message in _warnings(loads, contacts, first):
-                warnings.warn(message, ModelWarning, stacklevel=2)
+            for notice in _warnings(loads, contacts, first):
+                warnings.warn(ModelWarning(*notice), stacklevel=2)
             end, found = loop.run(state), None
             if self.stress is not None:
                 with observed(observers, "stress"):
                     found = self._stress(self.stress, loads, contacts.faces(end), unworn, first)
-                for message in found.faults(loads.peak):
-                    warnings.warn(message, ModelWarning, stacklevel=2)
+                for notice in found.faults(loads.peak):
+                    warnings.warn(ModelWarning(*notice), stacklevel=2)
             return WearResults(recorder, end, unworn, loads.line, found).tree()
 
     def begin(
@@ -264,10 +265,10 @@ def _evolves(contacts: Sequence[Contact]) -> bool:
 
 def _warnings(
     loads: LoadSource, contacts: FaceContacts, first: Sequence[FirstContact]
-) -> Iterator[str]:
+) -> Iterator[Notice]:
     """Return what makes results wrong though all solvers converge."""
     if isinstance(loads, StructureLoads):
-        yield from (remark.text for remark in loads.remarks() if remark.is_warning)
+        yield from (Notice(kind, text) for text, kind in loads.remarks() if kind is not None)
     yield from border_warnings(contacts.stages, first)
     if all(isinstance(stage.contact, InterfaceContact) for stage in contacts.stages):
         yield from few_cells_warnings(contacts.stages, first, loads.peak)

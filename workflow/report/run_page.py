@@ -14,6 +14,7 @@ from workflow.case.text.leaves import GIVEN, Leaf, in_words, leaves_of
 from workflow.case.text.readable import everyday_unit, percent, pretty, readable
 from workflow.case.text.typeset import exact_percent, given, number, typeset
 from workflow.kinds import analysis_of
+from workflow.messages.warning_kinds import kinds_in
 from workflow.report.numbers import error_budget, results
 from workflow.report.page import (
     Html,
@@ -119,7 +120,10 @@ def _outline(run: ReportData) -> Html:
 
 
 def _warnings(warnings: Sequence[str]) -> Html:
-    """Return a list of warnings; one that applies to several places appears once."""
+    """Return a list of warnings and what their codes mean.
+
+    A warning that applies to several places appears once.
+    """
     places: dict[str, list[str]] = {}
     parts = [warning.partition(": ") for warning in warnings]
     alike = Counter(rest for _, _, rest in parts)
@@ -131,7 +135,17 @@ def _warnings(warnings: Sequence[str]) -> Html:
         element("span", element("strong", "; ".join(those)), ": ", rest) if any(those) else rest
         for rest, those in places.items()
     )
-    return items(texts) if places else Html("")
+    return lines([items(texts), *_explained(warnings)]) if places else Html("")
+
+
+def _explained(warnings: Sequence[str]) -> Iterator[Html]:
+    """Yield a table of what the codes of the warnings mean, and what to do."""
+    rows = [
+        [kind.code, f"{kind.title}. {kind.meaning}", kind.remedy] for kind in kinds_in(warnings)
+    ]
+    if rows:  # warnings of older versions have no codes
+        explanations = table(["code", "meaning", "what to do"], rows, stacks=True)
+        yield folded("What the warnings mean", explanations)
 
 
 def _verdicts(run: ReportData) -> list[Verdict | str]:

@@ -8,7 +8,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from workflow.case.sections import Case, Measured
-from workflow.errors import UserError
+from workflow.errors import RunChanged
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import vector_figures
 from workflow.report.run_page import ReportData, run_page
@@ -70,7 +70,7 @@ def report_data_of(root: Path, figures: bool = True) -> ReportData:
     summary, results = folder.read_summary(), folder.results
     digests = summary[DIGESTS]
     if digests.get(results.name, "") != file_digest(results):
-        raise UserError(f"{results}: differs from the run in {root}; {folder.again}")
+        raise RunChanged(f"{results}: differs from the run in {root}; {folder.again}")
     case = load_case(folder.case)
     return ReportData(
         case=case,

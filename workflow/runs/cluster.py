@@ -16,7 +16,9 @@ from typing import Any
 
 from workflow.case.sections import Case
 from workflow.case.text.writing import dump_case
-from workflow.errors import MethodFailed, UserError, one_line
+from workflow.errors import ClusterLost, UserError, one_line
+from workflow.messages.error_kinds import ErrorKind
+from workflow.messages.warning_kinds import WarningKind
 from workflow.runs.job import Job, run_job
 from workflow.shell.forecast import in_words
 
@@ -77,9 +79,9 @@ class _Watch:
         self._last = self._looked = time.monotonic()
         self._tell_at = TELL
 
-    def failure(self, why: str, left: int) -> MethodFailed:
+    def failure(self, why: str, left: int) -> ClusterLost:
         """Return the exception to raise if ``left`` runs cannot be waited for."""
-        return MethodFailed(
+        return ClusterLost(
             f"--dask {self._address}: {why}, {left} of {self._total} runs may not have ended; "
             "finished runs are stored: continue with the same command"
         )
@@ -101,10 +103,11 @@ class _Watch:
             none, ending = "no worker yet", "Ctrl-C ends it"
             if self._come:
                 none, ending = "no worker is left", f"given up after {in_words(GIVE_UP)} of that"
-            LOG.warning(
+            text = (
                 f"--dask {self._address}: {none}, {left} of {self._total} runs wait for one; "
                 f"{ending}, finished runs are stored"
             )
+            LOG.warning(WarningKind.NO_WORKER.marked(text))
 
     def _has_workers(self) -> bool:
         try:
@@ -157,4 +160,5 @@ def _error_of(future: Any) -> str:
     try:
         return str(future.result())
     except Exception as error:
-        return f"lost by the cluster: {type(error).__name__}: {one_line(error)}"
+        text = f"lost by the cluster: {type(error).__name__}: {one_line(error)}"
+        return ErrorKind.CLUSTER_LOST.marked(text)

@@ -17,8 +17,9 @@ from typing import IO, Any
 from fe_models.interpreter import Process, do_each
 from sa_solver.errors import FretscaleError
 from workflow.case.sections import Case
-from workflow.errors import UserError, one_line
+from workflow.errors import UserError, marked_line, one_line
 from workflow.kinds import load_case
+from workflow.messages.error_kinds import ErrorKind
 from workflow.runs.run import bring_to_end
 from workflow.shell.folders.folder import OutputFolder
 
@@ -58,12 +59,14 @@ def _compute(job: Job, out: Path, take_over: bool) -> str:
     try:
         bring_to_end(job.load(), root, take_over)
     except FretscaleError as ending:
-        return one_line(ending)
+        return marked_line(ending)
     except Exception as ending:
         # What one line cannot say is kept in the log of the run.
         with suppress(OSError), OutputFolder(root).reserve_log().open("a", encoding="utf-8") as log:
             log.write(traceback.format_exc())
-        return one_line(f"{type(ending).__name__}: {ending}")
+        lacking = isinstance(ending, MemoryError)
+        kind = ErrorKind.OUT_OF_MEMORY if lacking else ErrorKind.DEFECT
+        return kind.marked(one_line(f"{type(ending).__name__}: {ending}"))
     return ""
 
 
@@ -101,18 +104,21 @@ def run_job(
 def _ending(code: int, stderr: IO[bytes]) -> str:
     """Return why a process has ended without an answer, in one line."""
     if code < 0:
-        return f"the process of this run got signal {-code}: did it run out of memory?"
+        text = f"the process of this run got signal {-code}: did it run out of memory?"
+        return ErrorKind.PROCESS_LOST.marked(text)
     stderr.seek(0)
     last = (stderr.read().decode(errors="replace").strip().splitlines() or ["no message"])[-1]
-    return f"the process of this run ended with exit code {code}: {last}"
+    text = f"the process of this run ended with exit code {code}: {last}"
+    return ErrorKind.PROCESS_LOST.marked(text)
 
 
 def finished(job: Job, out: Path, error: str) -> Finished:
     """Return a job that has ended, with the summary of its run."""
     root = out / job.name
     if not error and not OutputFolder(root).summary.exists():
-        error = f"{root}: finished, but its summary is not visible here: is the folder shared?"
+        text = f"{root}: finished, but its summary is not visible here: is the folder shared?"
+        error = ErrorKind.RUN_CHANGED.marked(text)
     try:
         return Finished(job, root, None if error else OutputFolder(root).read_summary(), error)
     except UserError as damaged:
-        return Finished(job, root, None, one_line(damaged))
+        return Finished(job, root, None, marked_line(damaged))

@@ -12,7 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 
 from workflow.case.sections import Case
-from workflow.errors import Ending, one_line
+from workflow.errors import Ending, marked_line
 from workflow.runs.cluster import run_on_cluster
 from workflow.runs.job import Finished, Job, finished, run_job
 from workflow.runs.run import stored_run
@@ -54,7 +54,7 @@ def run_jobs(
         try:
             case = job.load()
         except Ending as error:
-            end(job, one_line(error))
+            end(job, marked_line(error))
             continue
         root = out / job.name
         # A finished run with leftovers is not reused here: resuming it removes them.

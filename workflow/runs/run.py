@@ -14,6 +14,7 @@ from workflow.case.sections import Case
 from workflow.case.text.writing import dump_case
 from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
+from workflow.messages.warning_kinds import WarningKind
 from workflow.pictures.drawing import load_what_draws, write_pictures
 from workflow.report.run_page import ReportData
 from workflow.report.writing import pictures_of, write_page
@@ -244,8 +245,9 @@ def _run(
             reporter.say(line)
         if stays:
             reporter.warn(
+                WarningKind.FOREIGN_FILES,
                 f"{', '.join(stays)}: in the folder before this run, and not part of it; files "
-                f"whose names the run needs get {ASIDE} at their end"
+                f"whose names the run needs get {ASIDE} at their end",
             )
         _announce(case, reporter.expected, resume, reporter)
         run = Run(

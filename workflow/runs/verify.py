@@ -9,6 +9,7 @@ from rich.table import Column, Table
 
 from workflow.errors import UserError
 from workflow.kinds import load_case
+from workflow.messages.warning_kinds import WarningKind
 from workflow.runs.run import run_case
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.expectations import verdicts
@@ -56,12 +57,10 @@ def verify_cases(cases: tuple[Path, ...], out: Path, loudness: Loudness = Loudne
             table.add_row(verdict.entry.quantity, *row, verdict.entry.source)
             if not verdict.met and loudness is Loudness.QUIET:
                 reported = f"{verdict.computed:.6g} {verdict.unit}".rstrip()
-                terminal().print(
-                    f"warning: {path}: {verdict.entry.quantity}: {reported}, expected "
-                    f"{verdict.expected:.6g}",
-                    markup=False,
-                    soft_wrap=True,
+                missed = WarningKind.EXPECTATION_NOT_MET.marked(
+                    f"{path}: {verdict.entry.quantity}: {reported}, expected {verdict.expected:.6g}"
                 )
+                terminal().print(f"warning: {missed}", markup=False, soft_wrap=True)
         if loudness > Loudness.QUIET:
             console.print(table)
     return met_all

@@ -9,7 +9,8 @@ from typing import Any
 from sa_solver.surfaces.resolution import fewest_across, is_point, peak_error, too_few_across
 from sa_solver.types import Array, Grid
 from workflow.case.text.readable import percent
-from workflow.errors import UserError
+from workflow.errors import TooCoarse
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.terminal.reporter import Reporter
 
 # Largest number of cells of a contact grid along a direction.
@@ -54,15 +55,16 @@ def check_cells(
         grids.append(f"contact.size: {_entry(less, settings.size)}")
     cells, remedy = " x ".join(map(str, across)), " or ".join(grids or ["a finer contact.grid"])
     if is_point(pressed) and not worn:
-        raise UserError(
+        raise TooCoarse(
             f"contact.grid: {name} is only {cells} cells across, so its size and pressure are "
             f"meaningless: finer cells are needed than those of {remedy}"
         )
     after = " after wear" if worn else ""
     reporter.warn(
+        WarningKind.FEW_CELLS,
         f"{name} is only {cells} cells across{after}, and {enough} are needed: the largest "
         f"pressure may have an error of {percent(peak_error(min(across)))}, and the width one of a "
-        f"cell; take {remedy}"
+        f"cell; take {remedy}",
     )
 
 

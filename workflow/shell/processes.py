@@ -14,7 +14,7 @@ from queue import SimpleQueue
 from typing import IO, Any
 
 from fe_models.interpreter import Process, attempt, do_each, write_message
-from workflow.errors import MethodFailed
+from workflow.errors import ProcessLost
 
 Task = tuple[Callable[..., Any], tuple[Any, ...]]
 """A function that can be pickled, and its arguments."""
@@ -168,7 +168,7 @@ def _watched() -> Iterator[None]:
     try:
         yield
     except (EOFError, OSError) as error:
-        raise MethodFailed(
+        raise ProcessLost(
             f"a process of the run is gone ({type(error).__name__}): did it run out of memory?"
         ) from error
 

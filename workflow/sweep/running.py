@@ -17,7 +17,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.case.text.plain import counted, shares
-from workflow.errors import CaseError, UserError
+from workflow.errors import CaseError, FolderTaken
 from workflow.kinds import analysis_of
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
@@ -96,7 +96,7 @@ def _check_runs(sweep: Sweep, runs: Sequence[SweepRun], out: Path, force: bool) 
             continue
         states.append(stored_run(out / run.name, case))
         if states[-1] == "other" and not force:
-            raise UserError(
+            raise FolderTaken(
                 f"{out / run.name}: holds a run of another case; give another folder, or --force"
             )
     if wrong:

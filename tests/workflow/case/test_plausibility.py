@@ -18,6 +18,7 @@ from workflow.case.fields import Quantity
 from workflow.case.plausibility import USUAL, hertz, plausibility_warnings_of
 from workflow.case.sections import Section, entry_of, sections_of
 from workflow.kinds import kinds, load_case, template
+from workflow.messages.warning_kinds import WarningKind
 
 CASES = sorted([*Path("cases").glob("*.yaml"), *Path("cases/validation").glob("*.yaml")])
 
@@ -65,7 +66,8 @@ SLIPS = [
 def told_of(kind: str, slip: str, folder: Path) -> list[str]:
     path = folder / "mine.yaml"
     path.write_text(template(kind), encoding="utf-8")
-    return list(plausibility_warnings_of(load_case(path, [slip, *BESIDE.get(slip, ())])))
+    case = load_case(path, [slip, *BESIDE.get(slip, ())])
+    return list(map(str, plausibility_warnings_of(case)))
 
 
 # Further changes that make a case valid.
@@ -97,7 +99,8 @@ def test_heights_in_another_unit_give_a_warning(scale: float, words: str, tmp_pa
     path.write_text(template("bodies"), encoding="utf-8")
     assert list(plausibility_warnings_of(load_case(path, [*heights_case, slip]))) == []
     np.save(tmp_path / "gap.npy", scale * heights)
-    (reported,) = plausibility_warnings_of(load_case(path, [*heights_case, slip]))
+    ((kind, reported),) = plausibility_warnings_of(load_case(path, [*heights_case, slip]))
+    assert kind is WarningKind.UNUSUAL_LENGTH
     assert words in reported
 
 

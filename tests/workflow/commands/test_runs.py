@@ -135,7 +135,7 @@ def test_jobs_have_one_thread_each(contact, tmp_path, monkeypatch):
     code = f"import os; raise SystemError([os.environ[name] for name in {names}])"
     monkeypatch.setattr(interpreter, "COMMAND", code)
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
-    assert done.error.endswith(f"SystemError: {['1'] * len(names)}")
+    assert f"SystemError: {['1'] * len(names)}" in done.error
 
 
 def test_cores_are_shared_out(contact, tmp_path, monkeypatch):

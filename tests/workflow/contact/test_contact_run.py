@@ -14,6 +14,7 @@ from sa_solver.cycles.history import History
 from tests.workflow.command_line import invoke
 from tests.workflow.conftest import manifest_has_all
 from workflow.analyses.contact import run as contact_run
+from workflow.messages.warning_kinds import WarningKind, kinds_in
 
 SMALL = """\
 title: Ball
@@ -193,7 +194,7 @@ def test_summary_has_states_and_the_loop(whole):
     assert (loop["from_increment"], loop["to_increment"]) == (4, 12)
     # Eight steps around the loop: the trapezoids' area to a few per cent.
     assert loop["area"] == pytest.approx(loop["energy"], rel=0.1)
-    assert any("yield" in warning for warning in summary["warnings"])
+    assert WarningKind.PRESSURE_ABOVE_YIELD in kinds_in(summary["warnings"])
 
 
 def test_path_from_a_file_is_the_same_run(whole, small, tmp_path):

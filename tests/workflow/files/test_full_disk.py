@@ -15,6 +15,7 @@ from tests.workflow.command_line import runs_here
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow.errors import NotWritten
 from workflow.kinds import load_case
+from workflow.messages.error_kinds import ErrorKind
 from workflow.runs.run import resume_run, run_case
 from workflow.shell.folders.store import replacing_hdf5, write_arrays, write_text
 
@@ -195,4 +196,6 @@ def test_output_that_cannot_be_written_is_one_line(arguments):
     with FULL.open("w") as full:
         ending = command(*arguments, stdout=full)
     assert ending.returncode == 3
-    assert ending.stderr == "fretscale: output: No space left on device\n"
+    (line,) = ending.stderr.splitlines()
+    assert line.startswith("fretscale: output: No space left on device")
+    assert ErrorKind.OUTPUT_FAILED.code in line

@@ -100,7 +100,7 @@ def test_coefficients_of_both_bodies_come_back_through_closed_forms(folder, monk
         assert any(
             d.startswith(f"{path}: finer runs change it by") for d in found.plausibility_warnings
         )
-    assert "the runs: it is a closed form" in found.plausibility_warnings
+    assert any("it is a closed form" in caveat for caveat in found.plausibility_warnings)
     assert found.summary["runs"]["made"] <= 5
     section = YAML(typ="safe", pure=True).load(found.section)["wear"]
     assert list(section) == ["law", "body_1", "body_2"]

@@ -17,6 +17,7 @@ from workflow.case.plausibility import plausibility_warnings_of
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.terminal.reporter import Reporter
 
 STRUCTURE = """\
@@ -289,10 +290,9 @@ def test_matrices_by_other_names_are_offered(two):
     given = {"K": STIFF, "M": MASS, "D": 1e-4 * STIFF, "B": np.eye(2)[:, :1], "shapes": np.eye(3)}
     scipy.io.savemat(two / "plant.mat", {**given, "title": "two masses"})
     file = "structure.matrices.file=plant.mat"
-    (warned,) = plausibility_warnings_of(parse_case(OWN, str(two / "case.yaml"), [file]))
-    assert warned.startswith(
-        "structure.matrices.damping: no matrix with a usual name; plant.mat:D could"
-    )
+    ((kind, warned),) = plausibility_warnings_of(parse_case(OWN, str(two / "case.yaml"), [file]))
+    assert kind is WarningKind.DAMPING_NOT_TAKEN
+    assert "plant.mat:D" in warned
     line = reported(two, file, "structure.driven={load: 1}")
     assert "no loads have a usual name, or matrices.loads: plant.mat:B" in line
     taken = [file, "structure.matrices.damping=plant.mat:D", "structure.matrices.loads=plant.mat:B"]

@@ -10,6 +10,7 @@ from sa_solver.types import Grid
 from tests.workflow.command_line import command
 from workflow.analyses.contact.case import ContactGrid
 from workflow.errors import UserError
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.few_cells import check_cells
 
 BALL = """\
@@ -28,7 +29,9 @@ STRIP = BALL.replace("shape: sphere, radius: 10 mm", "shape: cylinder, radius: 1
 
 
 class Warnings(list):
-    warn = list.append
+    def warn(self, kind, text):
+        assert kind is WarningKind.FEW_CELLS
+        self.append(text)
 
 
 def run(tmp_path, text, *settings):
@@ -51,7 +54,7 @@ def test_a_run_proposes_grids_that_do(tmp_path, text, grid, size, across):
     assert done.exit_code == 0
     found, enough = across.split(", ")
     assert f"the contact is only {found} cells across, and {enough} are needed" in warning
-    found = re.search(r"take (contact.grid: .*) or (contact.size: .*)", warning)
+    found = re.search(r"take (contact.grid: .*) or (contact.size: .*) ", warning)
     for proposed in found.groups():
         _, warnings = run(tmp_path, text, coarse, proposed.replace(": ", "=", 1))
         assert warnings == []

@@ -32,7 +32,7 @@ def stopped(start, tmp_path_factory):
     assert run.ending.exit_code == 130
     last = run.ending.stderr.splitlines()[-1]
     assert last.startswith("fretscale: interrupted")
-    assert last.endswith(f"continue with `fretscale resume {run.folder}`")
+    assert f"continue with `fretscale resume {run.folder}`" in last
     return run
 
 

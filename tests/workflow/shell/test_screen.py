@@ -12,16 +12,19 @@ from rich.console import Console
 
 from tests.marks import slow
 from workflow.cli import TO_TRY, cli
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.terminal import screen
 from workflow.shell.terminal.reporter import LINE, Reporter
 from workflow.shell.terminal.screen import Loudness
+
+TOLD = f"warning: too coarse [{WarningKind.FEW_CELLS.code}]"
 
 
 def said_by(reporter: Reporter) -> None:
     reporter.say("a line")
     reporter.log("a detail")
     with reporter.stage("mesh"):
-        reporter.warn("too coarse")
+        reporter.warn(WarningKind.FEW_CELLS, "too coarse")
     reporter.close()
 
 
@@ -32,16 +35,16 @@ def without_times(lines: list[str]) -> list[str]:
 @pytest.mark.parametrize(
     ("loudness", "received"),
     [
-        (Loudness.QUIET, ["warning: too coarse"]),
-        (Loudness.NORMAL, ["a line", "warning: too coarse"]),
-        (Loudness.VERBOSE, ["a line", "a detail", "warning: too coarse", "mesh: ... s"]),
+        (Loudness.QUIET, [TOLD]),
+        (Loudness.NORMAL, ["a line", TOLD]),
+        (Loudness.VERBOSE, ["a line", "a detail", TOLD, "mesh: ... s"]),
     ],
 )
 def test_the_log_has_all_however_quiet_it_is(loudness, received, tmp_path, capsys):
     said_by(Reporter(tmp_path / "log", loudness=loudness))
     assert without_times(capsys.readouterr().err.splitlines()) == received
     logged = [line[9:] for line in (tmp_path / "log").read_text("utf-8").splitlines()]
-    assert without_times(logged) == ["a line", "a detail", "warning: too coarse", "mesh: ... s"]
+    assert without_times(logged) == ["a line", "a detail", TOLD, "mesh: ... s"]
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ import pytest
 from fe_models.dynamics.motion import Start
 from fe_models.dynamics.transient.record import StepState
 from wear.joints.law import JointResponse
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.folders import checkpoint, packing, steps
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.folders.packing import PackingError, packed, unpacked
@@ -46,7 +47,7 @@ class Work:
             raise CutOff
         self.done += 1
         if number % 3 == 0:
-            self.reporter.warn(f"{number} divides by 3")
+            self.reporter.warn(WarningKind.MANY_STEPS, f"{number} divides by 3")
         return np.array([[number, number + 1.0], [0.5, 0.25]]).T
 
     def outer(self, number):

@@ -26,6 +26,7 @@ from workflow.case.text.readable import percent
 from workflow.case.text.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import load_case
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.folders.folder import OutputFolder
 
 # Coarse enough to run in a second; probes have a mesh of their own.
@@ -114,7 +115,9 @@ def test_only_what_a_section_has_is_warned_of(plane, plane_path, tmp_path):
     coarse = run_case(
         plane_path, tmp_path / "out", "contact.grid=[16, 32]", "wear.cycles=3e4", *QUIET
     )
-    warned = [line for line in coarse.summary["warnings"] if "misses" in line]
+    warned = [
+        line for line in coarse.summary["warnings"] if WarningKind.EDGE_PEAK_MISSED.code in line
+    ]
     assert warned
     assert all("at the edge" in line and "end" not in line for line in warned)
 

@@ -42,6 +42,7 @@ from workflow.case.sections import (
 )
 from workflow.case.source import Source
 from workflow.case.text.plain import of_bodies, plain, shape_in_words
+from workflow.messages.warning_kinds import Notice
 from workflow.models.gaps import GapFunction
 from workflow.models.uncoupled.load_table import PRESSING, LoadTable
 
@@ -345,7 +346,7 @@ class BodiesCase(Case):
             ("contact", f"{cells}, history {self.contact.history}"),
         ]
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         grid, table = self.contact.centred(), self.load_path.table()
         loads = table.columns
         sides = grid.shape[0] * grid.pitch[0], grid.shape[1] * grid.pitch[1]
@@ -418,7 +419,7 @@ def check_surfaces(bodies: Bodies, grid: Grid) -> None:
         bodies.surfaces.check(grid)
 
 
-def surface_warnings(bodies: Bodies, grid: Grid) -> Iterator[str]:
+def surface_warnings(bodies: Bodies, grid: Grid) -> Iterator[Notice]:
     """Warn about the units of measured surfaces, and about roughness that the grid loses."""
     if bodies.surfaces is not None:
         yield from bodies.surfaces.plausibility_warnings(grid)

@@ -10,6 +10,7 @@ from sa_solver.types import Array
 from workflow.case.plausibility import pressed
 from workflow.case.sections import ElasticSection
 from workflow.case.text.plain import plain
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.uncoupled.load_table import LoadTable
 
 # Shear below this share of the friction limit is hardly intended.
@@ -22,30 +23,32 @@ ROUNDING = 1e-9
 
 def about_pressure(
     path: str, pressure: float, bodies: Sequence[ElasticSection | str]
-) -> Iterator[str]:
+) -> Iterator[Notice]:
     """Warn about the largest pressure [MPa] under the loads, compared with the bodies' strength."""
     elastic = [body for body in bodies if isinstance(body, ElasticSection)]
     limits = [getattr(body, "yield_stress", None) for body in elastic]
     yield from pressed(path, pressure, limits, [body.elastic().young for body in elastic])
 
 
-def about_grid(width: float, sides: Sequence[float], cells: Sequence[int]) -> Iterator[str]:
+def about_grid(width: float, sides: Sequence[float], cells: Sequence[int]) -> Iterator[Notice]:
     """Warn about a grid that is too small or too coarse for an unworn contact of ``width`` [mm]."""
     shown = f"the contact is about {plain(width, 'mm', 3)} wide"
     if width > min(sides):
-        yield (
+        yield Notice(
+            WarningKind.UNSUITABLE_GRID,
             f"contact.size: {plain(min(sides), 'mm')} is smaller than the contact ({shown}): take "
-            "a larger one"
+            "a larger one",
         )
     pitch = max(side / count for side, count in zip(sides, cells, strict=False) if count > 1)
     if width < FEWEST * pitch:
-        yield (
+        yield Notice(
+            WarningKind.UNSUITABLE_GRID,
             f"contact.size: cells of {plain(pitch, 'mm', 3)} are too large ({shown}): take a "
-            "smaller size, or more cells in contact.grid"
+            "smaller size, or more cells in contact.grid",
         )
 
 
-def about_shear(path: str, table: LoadTable, friction: float, unit: str) -> Iterator[str]:
+def about_shear(path: str, table: LoadTable, friction: float, unit: str) -> Iterator[Notice]:
     """Warn about tangential forces, compared with the friction limit, where P is imposed."""
     forces = {"Qx", "Qy"} & table.columns.keys()
     if not forces or "P" not in table.columns:
@@ -55,12 +58,14 @@ def about_shear(path: str, table: LoadTable, friction: float, unit: str) -> Iter
     largest = int(np.argmax(shear - carried))
     names = " and ".join(sorted(forces))
     if shear[largest] > (1.0 + ROUNDING) * carried[largest]:
-        yield (
+        yield Notice(
+            WarningKind.FRICTION_EXCEEDED,
             f"{path}: {names} of {plain(float(shear[largest]), unit, 3)} exceed what friction "
-            f"carries, {plain(float(carried[largest]), unit, 3)}: the run would end there"
+            f"carries, {plain(float(carried[largest]), unit, 3)}: the run would end there",
         )
     elif 0.0 < shear.max() < HARDLY * carried.max():
-        yield (
+        yield Notice(
+            WarningKind.UNUSUAL_LOAD,
             f"{path}: {names} up to {plain(float(shear.max()), unit, 3)} are far below what "
-            f"friction carries, {plain(float(carried.max()), unit, 3)}: is the unit right?"
+            f"friction carries, {plain(float(carried.max()), unit, 3)}: is the unit right?",
         )

@@ -17,6 +17,7 @@ from workflow.analyses.contact.output.results import (
 )
 from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed, UserError
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.few_cells import check_cells
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.terminal.reporter import Reporter
@@ -48,7 +49,7 @@ def _march(
     """Return the outcome of the path, and a message on why it ended early; empty if it did not."""
     grid, table = case.contact.centred(), case.load_path.table()
     for warning in surface_warnings(case.structure, grid):
-        reporter.warn(warning)
+        reporter.warn(*warning)
     height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
     strain = table.bulk_strain(bodies_of(case))
     passed: dict[int, ContactState] = {}
@@ -104,14 +105,16 @@ def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
     _warn_of_increments(outcome, reporter)
     if any(state.border_load > 0.0 for state in states):
         reporter.warn(
-            "the contact touches the border of its grid and is cut off there: raise contact.size"
+            WarningKind.CONTACT_AT_BORDER,
+            "the contact touches the border of its grid and is cut off there: raise contact.size",
         )
     highest = max(float(state.traction[2].max()) for state in states)
     yield_stress = min(body.yield_stress for body in bodies_of(outcome.case))
     if highest > yield_stress:
         reporter.warn(
+            WarningKind.PRESSURE_ABOVE_YIELD,
             f"the pressure reaches {highest:.0f} MPa, above the yield stress of "
-            f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
+            f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there",
         )
 
 
@@ -140,6 +143,7 @@ def _warn_of_increments(outcome: ContactOutcome, reporter: Reporter) -> None:
             f"take contact.history: auto, which splits increments, or more increments ({place})"
         )
     reporter.warn(
+        WarningKind.LONG_INCREMENTS,
         f"the increments of the load cause errors of about {' and '.join(left)}, above "
-        f"contact.accuracy of {percent(accuracy)}: {shorter}"
+        f"contact.accuracy of {percent(accuracy)}: {shorter}",
     )

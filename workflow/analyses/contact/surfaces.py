@@ -25,6 +25,7 @@ from workflow.case.fields import File, Quantity, Word, split_dataset
 from workflow.case.files.scan_files import ENDINGS, NEAR, UNITS, read_scan
 from workflow.case.sections import Length, Section, at_entry, disagreement, entry, one_of
 from workflow.case.text.plain import plain, shares
+from workflow.messages.warning_kinds import Notice, WarningKind
 
 Shift = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4, range_text="-10 to 10 m")]
 Angle = Annotated[float, Quantity("rad", at_least=-6.4, at_most=6.4, range_text="-360 to 360 deg")]
@@ -217,19 +218,22 @@ class SurfacesOfTwo(Section):
             for name, numbers in summary.items()
         }
 
-    def plausibility_warnings(self, grid: Grid, key: str = KEY) -> Iterator[str]:
+    def plausibility_warnings(self, grid: Grid, key: str = KEY) -> Iterator[Notice]:
         """Warn about units, and about grids that lose the roughness."""
         for name, numbers in self.summary(grid).items():
             height = numbers["rms"]
             if height > STEEP * min(grid.size[: 1 if grid.line else 2]) or SMOOTH < height < FINE:
-                yield f"{key}.{name}: heights of {plain(height, 'mm', 3)} rms: is their unit right?"
+                text = f"heights of {plain(height, 'mm', 3)} rms: is their unit right?"
+                yield Notice(WarningKind.UNUSUAL_LENGTH, f"{key}.{name}: {text}")
             if (step := min(numbers["pitch"])) < NEAR:
-                yield f"{key}.{name}: points {plain(step, 'mm', 3)} apart: is their unit right?"
+                text = f"points {plain(step, 'mm', 3)} apart: is their unit right?"
+                yield Notice(WarningKind.UNUSUAL_LENGTH, f"{key}.{name}: {text}")
             if height > SMOOTH and numbers["lost"] > LOST * height:
                 lost = f"{plain(numbers['lost'], 'mm', 3)} of {plain(height, 'mm', 3)} rms"
-                yield (
+                yield Notice(
+                    WarningKind.LOST_ROUGHNESS,
                     f"{key}.{name}: {lost} is finer than the cells, which cannot carry it: take "
-                    "more cells"
+                    "more cells",
                 )
 
 

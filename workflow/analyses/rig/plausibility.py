@@ -10,6 +10,7 @@ from sa_solver.types import Array
 from workflow.analyses.rig.bodies.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import FrictionRig, RowOfMasses, joints_of
 from workflow.case.sections import Section
+from workflow.messages.warning_kinds import Notice, WarningKind
 
 # A force at one frequency that is this many times away from every mode is hardly intended.
 AWAY = 30.0
@@ -23,7 +24,7 @@ def about_modes(
     structure: Section,
     stiffness: float = RIGID,
     shared: bool = True,
-) -> Iterator[str]:
+) -> Iterator[Notice]:
     """Warn if a rig has no mode in a ``span`` [Hz], with its joints neither open nor stuck.
 
     ``stiffness`` [N/mm] is that of the stuck joints, and some joints may have a ``shared`` law. As
@@ -36,13 +37,14 @@ def about_modes(
     if not ((opened <= high) & (stuck >= low)).any():
         shown = (", ".join(f"{f:.3g}" for f in frequencies) for frequencies in (opened, stuck))
         free, held = shown
-        yield (
+        yield Notice(
+            WarningKind.NO_MODE_NEAR,
             f"{path}: no mode of the rig is near: they are at {free} Hz with an open joint and at "
-            f"{held} Hz with a stuck one; are the units of masses, springs and stiffness right?"
+            f"{held} Hz with a stuck one; are the units of masses, springs and stiffness right?",
         )
 
 
-def about_matrices(structure: Section, highest: float) -> Iterator[str]:
+def about_matrices(structure: Section, highest: float) -> Iterator[Notice]:
     """Warn about matrices with implausible masses or frequencies.
 
     ``highest`` is the highest frequency of the motion [Hz].

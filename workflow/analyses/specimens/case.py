@@ -39,6 +39,7 @@ from workflow.case.sections import (
     one_of,
 )
 from workflow.case.text.plain import of_bodies, plain, shares, times
+from workflow.messages.warning_kinds import Notice, WarningKind
 
 if TYPE_CHECKING:
     from fe_models.geometry.specimens import Specimen
@@ -313,12 +314,13 @@ class SpecimensCase(WithScans, Case):
             ("wear", f"{end}{' each' * several}, in cycle blocks of {block}"),
         ]
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         side = self.structure.strip_width
         if self.load_path.stroke > side:
-            yield (
+            yield Notice(
+                WarningKind.LONG_STROKE,
                 f"load_path.stroke: {plain(self.load_path.stroke, 'mm')}, longer than the pad "
-                f"({plain(side, 'mm')}): is its unit right?"
+                f"({plain(side, 'mm')}): is its unit right?",
             )
         bodies = self.materials.body_1, self.materials.body_2
         for index, force in enumerate(self.load_path.normal_forces):

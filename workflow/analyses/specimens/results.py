@@ -28,6 +28,7 @@ from workflow.analyses.specimens.summary import (
     tied_pad,
 )
 from workflow.analyses.wear.output.datasets import kinetics_columns, mesh_of
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.specimens.wear import BlockState
 from workflow.shell.analysis import Run
 from workflow.shell.folders.store import replacing_hdf5
@@ -148,8 +149,9 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
     for load in loads:
         if late(load):
             reporter.warn(
+                WarningKind.NOT_STEADY,
                 f"{load['normal_force']:g} N: steady only near the end of the run; raise "
-                "wear.energy or wear.cycles to be sure"
+                "wear.energy or wear.cycles to be sure",
             )
     coefficients = wear.body_1.rate(1.0), wear.body_2.rate(1.0)  # reports need laws of energy
     return {

@@ -33,6 +33,7 @@ from workflow.analyses.specimens.outcome import (
 from workflow.analyses.specimens.results import write_specimens_output
 from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed, UserError
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.specimens.reduced import ReducedSpecimens
 from workflow.models.specimens.wear import BlockState
 from workflow.shell.analysis import Run
@@ -86,7 +87,7 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
 
 def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> SpecimensOutcome:
     for warning in case.surface_warnings():
-        reporter.warn(warning)
+        reporter.warn(*warning)
     model = reduced_pair(case)
     with reporter.stage("mesh"):
         nodes = model.node_count()
@@ -151,10 +152,11 @@ def _fret(
     for state in (first, last):
         if state.misfit is not None and state.misfit > LARGEST_RESIDUAL:
             reporter.warn(
+                WarningKind.UNCERTAIN_LINK,
                 f"{name}: the link to the specimens has an error of {percent(state.misfit)} of the "
                 "deformation of half-spaces, and its pressures may be wrong by as much: raise "
                 "mesh.pad_elements (no mesh is fine enough for the sharp border of unworn flat "
-                "pads)"
+                "pads)",
             )
     check_cells(name, case.contact, grid, first.pressure, reporter)
     check_cells(name, case.contact, grid, last.pressure, reporter, worn=True)

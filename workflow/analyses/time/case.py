@@ -52,6 +52,7 @@ from workflow.case.sections import (
     one_of,
 )
 from workflow.case.text.plain import plain, times
+from workflow.messages.warning_kinds import Notice
 
 StepError = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
 JumpError = Annotated[float, Quantity("1", at_least=1e-10, at_most=0.1)]
@@ -287,7 +288,7 @@ class RigCase(TimeCase):
             rows.append(("ageing", ageing_outline(self.ageing)))
         return rows
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         excitation, own = self.excitation, own_laws(self.structure)
         stiffness = RIGID if any(own) else self.joint.stiffness
         if isinstance(excitation, Harmonic):

@@ -30,6 +30,7 @@ from workflow.analyses.time.outcome import State, TimeOutcome
 from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 from workflow.layout.declared import Arrays
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.rig.joint import evolution_curve
 from workflow.models.rig.rig_model import RigModel
 from workflow.shell.terminal.reporter import Reporter
@@ -92,8 +93,9 @@ def _state(
     response = frequency_response(blow.value(motion.times), acceleration, step)
     if response.remaining > AT_REST:
         reporter.warn(
+            WarningKind.RECORD_ENDS_EARLY,
             f"at {joules(energy)} the record ends with {percent(response.remaining)} of the "
-            "response left, which blurs its peaks: raise excitation.record"
+            "response left, which blurs its peaks: raise excitation.record",
         )
     peaks = _peak("first", response, *hammer.band, energy)
     if rig.in_a_row and len(bounds["stuck"]) > 1:
@@ -162,11 +164,11 @@ def _ring_down(
     try:
         decay = ring_down(rig.looked_at(motion.acceleration)[free], step, hammer.band)
     except SignalError as error:
-        reporter.warn(f"no ring-down at {joules(energy)}: {error}")
+        reporter.warn(WarningKind.NO_RING_DOWN, f"no ring-down at {joules(energy)}: {error}")
         return None
     amplitude = decay.amplitude / (2.0 * np.pi * decay.frequency) ** 2
     if amplitude[0] < NOTHING_LEFT * np.abs(rig.looked_at(motion.displacement)).max():
-        reporter.warn(f"no ring-down at {joules(energy)}: {TOO_SHORT}")
+        reporter.warn(WarningKind.NO_RING_DOWN, f"no ring-down at {joules(energy)}: {TOO_SHORT}")
         return None
     kept = np.unique(np.linspace(0, len(amplitude) - 1, RING_DOWN_POINTS).astype(int))
     return {

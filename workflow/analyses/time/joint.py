@@ -23,6 +23,7 @@ from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import wearing_joint
 from workflow.analyses.time.outcome import State, TimeOutcome
 from workflow.errors import MethodFailed, UserError
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.rig.joint import WearingJoint, ageing_test, evolution_curve, steady_loop
 from workflow.shell.terminal.reporter import Reporter
 
@@ -115,7 +116,8 @@ def energies_within(
             yield energy
         elif energy > last:
             reporter.warn(
-                f"energies: {joules(energy)} are not reached: the test ends at {joules(last)}"
+                WarningKind.ENERGY_NOT_REACHED,
+                f"energies: {joules(energy)} are not reached: the test ends at {joules(last)}",
             )
     yield last
 

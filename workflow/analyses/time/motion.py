@@ -16,6 +16,7 @@ from workflow.analyses.time.joint_model import JointModel
 from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed
 from workflow.layout.declared import Arrays
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.rig.motion import LARGEST_ERROR, MotionModel, curves_of
 from workflow.models.rig.rig_model import RigModel
 from workflow.shell.terminal.reporter import Reporter
@@ -53,8 +54,9 @@ def warn_of_steps(energy: float, error: float, reporter: Reporter) -> None:
     """Warn where the time steps cause a large error of a motion at an ``energy`` [N mm]."""
     if error > LARGEST_ERROR:
         reporter.warn(
+            WarningKind.LONG_TIME_STEPS,
             f"at {joules(energy)} the time steps cause an error of {percent(error)} of the largest "
-            "displacement: lower integration.step"
+            "displacement: lower integration.step",
         )
 
 

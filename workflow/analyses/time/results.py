@@ -8,6 +8,7 @@ from typing import Any
 from workflow.analyses.time.case import JointCase, RigCase, TimeCase, joules
 from workflow.analyses.time.outcome import LAYOUT, State, TimeOutcome
 from workflow.case.fields import in_unit_of
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.analysis import Run
 from workflow.shell.output.results import run_results
 from workflow.shell.output.summary import finish, number_at
@@ -65,7 +66,9 @@ def _summary(outcome: TimeOutcome, reporter: Reporter) -> dict[str, Any]:
     for entry in case.reported:
         computed = number_at(summary, entry.quantity)
         if computed is None:
-            reporter.warn(f"reported: no quantity {entry.quantity} in summary.json")
+            reporter.warn(
+                WarningKind.NOT_COMPARED, f"reported: no quantity {entry.quantity} in summary.json"
+            )
         comparison = {"quantity": entry.quantity, "reported": entry.value, "computed": computed}
         reported.append(comparison | {"source": entry.source})
     return summary | {"reported": reported}

@@ -32,6 +32,7 @@ from workflow.analyses.time.motion import (
 )
 from workflow.analyses.time.outcome import State, TimeOutcome
 from workflow.errors import MethodFailed
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.rig.joint import evolution_curve
 from workflow.models.rig.rig_model import RigModel
 from workflow.shell.terminal.reporter import Reporter
@@ -296,8 +297,9 @@ def _aged(
         nodes = sorted({*nodes, *inner, max(last, nodes[-1])})
     if error > ageing.tolerance:
         reporter.warn(
+            WarningKind.INACCURATE_AGEING,
             f"ageing: {len(nodes)} steady states cause an error of about {error:.1e}, above "
-            f"ageing.tolerance {ageing.tolerance:g}"
+            f"ageing.tolerance {ageing.tolerance:g}",
         )
     numbers = {"relative_error": error, "steady_states": len(nodes)}
     return rate, test, {"cycles": cycles, "energy": last, "ageing": numbers}

@@ -10,6 +10,7 @@ from workflow.analyses.time.case import JointCase, RigCase
 from workflow.analyses.wear.output.loop_table import SLIDES, read_loop_table
 from workflow.case.loading import YAML
 from workflow.errors import UserError
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.analysis import Run
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.terminal.reporter import Reporter
@@ -60,18 +61,21 @@ def warn_of_table(case: JointCase | RigCase, last: float, reporter: Reporter) ->
     table = read_loop_table(Path(case.evolution.file))
     if last > table.energy[-1]:
         reporter.warn(
+            WarningKind.TABLE_TOO_SHORT,
             f"evolution.file: its loops end at {1e-3 * table.energy[-1]:g} J; beyond, up to "
-            f"{1e-3 * last:g} J, the last one holds"
+            f"{1e-3 * last:g} J, the last one holds",
         )
     if table.sliding.min() < SLIDES:
         reporter.warn(
+            WarningKind.LOOPS_DO_NOT_SLIDE,
             f"evolution.file: {np.count_nonzero(table.sliding < SLIDES)} of its {len(table.mu)} "
             "loops do not slide as a whole, so their mu is less than the coefficient of "
-            "friction: compute them with a larger loops.amplitude"
+            "friction: compute them with a larger loops.amplitude",
         )
     load = case.joint.normal_load
     if load > 0.0 and np.any(np.abs(table.P - load) > SAME_LOAD * load):
         reporter.warn(
+            WarningKind.LOOPS_OF_ANOTHER_LOAD,
             f"evolution.file: its loops are under {table.P.min():g} to {table.P.max():g} N, but "
-            f"the joint is under {load:g} N, and stiffness depends on the load"
+            f"the joint is under {load:g} N, and stiffness depends on the load",
         )

@@ -17,6 +17,7 @@ from workflow.analyses.vibration.output.harmonics import harmonics_of
 from workflow.analyses.vibration.output.outcome import Answers
 from workflow.analyses.vibration.response import warn_of_error
 from workflow.layout.declared import Arrays
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.vibration.motions import accurate, motion_columns
 from workflow.models.vibration.structure import VibratingStructure
 
@@ -51,7 +52,9 @@ def answers_under(
         ]
         message = _message(branch, frequency, found)
         if message:
-            run.reporter.warn(f"{reported} at {frequency:g} Hz: {message}")
+            run.reporter.warn(
+                WarningKind.MOTION_NOT_FOUND, f"{reported} at {frequency:g} Hz: {message}"
+            )
         those = [_numbers(model, branch, motion) for motion in motions]
         for motion in those:
             warn_of_error(run, f"{reported}: the motion at {frequency:g} Hz", motion["error"])

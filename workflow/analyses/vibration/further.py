@@ -19,6 +19,7 @@ from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.outcome import Curves
 from workflow.analyses.vibration.response import curves_of
 from workflow.analyses.vibration.stability import stability_along
+from workflow.messages.warning_kinds import WarningKind
 
 
 def further_from(
@@ -46,7 +47,8 @@ def further_from(
     )
     if not found:
         run.reporter.warn(
-            f"{name}: no further branch found: the search ended on known ones, or nowhere"
+            WarningKind.NO_FURTHER_BRANCH,
+            f"{name}: no further branch found: the search ended on known ones, or nowhere",
         )
     return [(branch, _curves(run, branch, name)) for branch in found]
 
@@ -54,7 +56,7 @@ def further_from(
 def _curves(run: VibrationRun, branch: FurtherBranch, name: str) -> Curves:
     """Return the curves of a branch, with its stability."""
     if branch.message:
-        run.reporter.warn(f"{name}: {branch.message}")
+        run.reporter.warn(WarningKind.CURVE_ENDS, f"{name}: {branch.message}")
     force = float(branch.forces[0])
     curve = curve_by_frequency(branch.problem, force)
     stability = stability_along(run, name, curve, branch.solutions)

@@ -15,6 +15,7 @@ from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.outcome import Curves
 from workflow.errors import MethodFailed, UserError
 from workflow.layout.declared import Arrays
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.vibration.motions import amplitudes_of
 from workflow.models.vibration.results import LARGEST_ERROR
 from workflow.models.vibration.structure import VibratingStructure
@@ -57,12 +58,13 @@ def mode_of(run: VibrationRun, number: int, problem: HarmonicBalance) -> Curves:
     if not branch.motions:
         raise MethodFailed(f"modes: mode {number}: {branch.message}")
     if branch.message:
-        run.reporter.warn(f"mode {number}: {branch.message}")
+        run.reporter.warn(WarningKind.CURVE_ENDS, f"mode {number}: {branch.message}")
     error = max(map(_error, branch.motions))
     if error > LARGEST_ERROR:
         run.reporter.warn(
+            WarningKind.INACCURATE_MOTION,
             f"mode {number} has an error of {error:.1e}: give a resolution.tolerance, or more "
-            "resolution.harmonics and resolution.samples"
+            "resolution.harmonics and resolution.samples",
         )
     first, last = branch.motions[0], branch.motions[-1]
     numbers: dict[str, Any] = {

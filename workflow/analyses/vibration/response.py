@@ -23,6 +23,7 @@ from workflow.analyses.vibration.stability import stability_along
 from workflow.case.text.plain import shares
 from workflow.errors import MethodFailed
 from workflow.layout.declared import Arrays
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.vibration.motions import amplitudes_of, motion_columns, peaks_inside
 from workflow.models.vibration.results import LARGEST_ERROR, ForcedResponse
 from workflow.models.vibration.structure import VibratingStructure
@@ -44,13 +45,16 @@ def response_under(run: VibrationRun, force: float) -> tuple[Response, ResponseB
     branch = sweep.curve(model, force, run.steps, watch)
     if branch.message:
         unbounded = UNBOUNDED if model.undamped else ""
-        reporter.warn(f"{reported}: {branch.message}{unbounded}")
+        reporter.warn(WarningKind.CURVE_ENDS, f"{reported}: {branch.message}{unbounded}")
     curve = curve_by_frequency(branch.problem, force)
     stability = stability_along(run, reported, curve, branch.solutions)
     curves = {**curves_of(run, branch), **stability.columns}
     amplitudes = curves["amplitude"][:, -1]
     if not peaks_inside(amplitudes):
-        reporter.warn(f"{reported}: no resonance, the largest motion is at an end of the curve")
+        reporter.warn(
+            WarningKind.NO_RESONANCE,
+            f"{reported}: no resonance, the largest motion is at an end of the curve",
+        )
     reporter.doing(f"{reported}: resonance")
     resonance = sweep.resonance(model, branch, amplitudes, run.steps)
     warn_of_stroke(model, f"{reported}: at resonance", resonance, reporter)
@@ -74,13 +78,15 @@ def warn_of_error(run: VibrationRun, motion: str, error: float) -> None:
     tolerance = run.case.resolution.tolerance
     if tolerance is None and error > LARGEST_ERROR:
         run.reporter.warn(
+            WarningKind.INACCURATE_MOTION,
             f"{motion} has an error of {error:.1e}: give a resolution.tolerance, or more "
-            "resolution.harmonics and resolution.samples"
+            "resolution.harmonics and resolution.samples",
         )
     if tolerance is not None and error > tolerance:
         run.reporter.warn(
+            WarningKind.INACCURATE_MOTION,
             f"{motion} has an error of {error:.1e} at the finest resolution, above "
-            f"resolution.tolerance {tolerance:g}"
+            f"resolution.tolerance {tolerance:g}",
         )
 
 
@@ -102,7 +108,9 @@ def force_sweep(run: VibrationRun, frequency: float) -> Curves:
     if not branch.solutions:
         raise MethodFailed(f"no motion at {frequency:g} Hz: {branch.message}; change force_sweeps")
     if branch.message:
-        run.reporter.warn(f"{frequency:g} Hz, along the {amount.name}: {branch.message}")
+        run.reporter.warn(
+            WarningKind.CURVE_ENDS, f"{frequency:g} Hz, along the {amount.name}: {branch.message}"
+        )
     curve = curve_by_force(branch.problem, frequency)
     stability = stability_along(run, f"{frequency:g} Hz", curve, branch.solutions)
     curves = curves_of(run, branch)
@@ -131,7 +139,7 @@ def backbone_of(run: VibrationRun, branch: ResponseBranch) -> Curves | None:
         steps=run.steps,
     )
     if backbone.message:
-        run.reporter.warn(f"backbone: {backbone.message}")
+        run.reporter.warn(WarningKind.CURVE_ENDS, f"backbone: {backbone.message}")
     if not backbone.solutions:
         return None
     curve = curve_by_phase(backbone.problem, backbone.solutions[0])
@@ -223,6 +231,8 @@ def warn_of_stroke(
     )
     if stroke > LARGE_STROKE * width:
         reporter.warn(
+            WarningKind.MOTION_NEGLECTED,
             f"{reported} the pads slide over each other by {stroke:.3g} mm, more than "
-            f"{shares(LARGE_STROKE)} of their width: the result neglects that other nodes then meet"
+            f"{shares(LARGE_STROKE)} of their width: the result neglects that other nodes then "
+            "meet",
         )

@@ -30,6 +30,7 @@ from workflow.analyses.vibration.response import backbone_of, force_sweep, respo
 from workflow.analyses.vibration.stability import looked_for
 from workflow.case.text.readable import percent
 from workflow.errors import UserError
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.analysis import Run
 from workflow.shell.folders.steps import resumable_steps
@@ -123,8 +124,9 @@ def _report_omissions(case: VibrationCase, model: VibratingStructure, reporter: 
         )
         if share > LEFT_OUT:
             reporter.warn(
+                WarningKind.LOST_FORCE,
                 f"excitation.records.{number}: {percent(share)} of its force is above the highest "
-                "harmonic used and is lost: raise highest, or resolution.harmonics"
+                "harmonic used and is lost: raise highest, or resolution.harmonics",
             )
     if case.stability == "auto" and not looked_for(case, model):
         reporter.say("stability: not computed in so large a structure; `stability: every` does it")

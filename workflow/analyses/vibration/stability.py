@@ -18,6 +18,7 @@ from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.layout import bifurcation_columns
 from workflow.layout.declared import Arrays
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.models.vibration.motions import amplitude_of
 from workflow.models.vibration.structure import VibratingStructure
@@ -76,7 +77,9 @@ def stability_along(
     _warn_of_folds(name, bifurcations, reporter)
     unknown = [at for at in known if at.verdict == "unknown"]
     if len(unknown) == len(known) and known:
-        reporter.warn(f"{name}: stability is not known: {unknown[0].message}")
+        reporter.warn(
+            WarningKind.UNKNOWN_STABILITY, f"{name}: stability is not known: {unknown[0].message}"
+        )
     numbers: dict[str, Any] = {
         "unstable_points": sum(at.verdict == "unstable" for at in known),
         "unknown_points": len(unknown),
@@ -100,9 +103,10 @@ def _warn_of_folds(
         multiplier = each["multiplier"] * np.exp(1j * each["multiplier_angle"])
         if abs(multiplier - 1.0) > AWAY:
             reporter.warn(
+                WarningKind.FALSE_FOLD,
                 f"{name}: the fold at {each['frequency']:.4g} Hz is not one of the motion itself, "
                 f"as no multiplier is near 1 there ({multiplier:.2g}): give more "
-                "resolution.harmonics and resolution.samples"
+                "resolution.harmonics and resolution.samples",
             )
 
 

@@ -33,6 +33,7 @@ from workflow.case.loading import YAML, CaseFile, load_case, outline_of
 from workflow.case.sections import Section, Title, disagreement, entry, in_its_place, one_of
 from workflow.case.source import Source
 from workflow.case.text.plain import entries, plain, times
+from workflow.messages.warning_kinds import Notice
 
 if TYPE_CHECKING:
     from workflow.models.rig.rig_model import RigModel
@@ -201,7 +202,7 @@ class VibrationWearCaseBase(VibrationCaseBase):
             ("method", self.resolved),
         ]
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         yield from super().plausibility_warnings()
         frequency: float | None = self.wear.frequency
         if frequency is not None:

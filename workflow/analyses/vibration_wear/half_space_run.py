@@ -39,6 +39,7 @@ from workflow.analyses.wear.translation import wear_of
 from workflow.case.loading import load_case
 from workflow.case.text.plain import counted, shares
 from workflow.layout.declared import Arrays
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.few_cells import check_cells
 from workflow.shell.terminal.reporter import Reporter
@@ -145,14 +146,16 @@ class _Description:
         check_cells("the contact", settings, grid, pressure, self.reporter, worn=worn)
         if cycle.slipping.normal.touches_border:
             self.reporter.warn(
-                "the contact reaches the border of its grid: enlarge contact.size of its case"
+                WarningKind.CONTACT_AT_BORDER,
+                "the contact reaches the border of its grid: enlarge contact.size of its case",
             )
         pressed = cycle.slipping.normal.pressure.any(axis=1)
         width = float(np.count_nonzero(pressed)) * self.contact.grid.pitch[0]
         if cycle.stroke > LARGE_STROKE * width:
             self.reporter.warn(
+                WarningKind.MOTION_NEGLECTED,
                 f"the stroke exceeds {shares(LARGE_STROKE)} of the contact's width: the result "
-                "neglects that the surfaces move over each other"
+                "neglects that the surfaces move over each other",
             )
 
 

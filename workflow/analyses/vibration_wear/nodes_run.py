@@ -40,6 +40,7 @@ from workflow.analyses.vibration_wear.states import responses_to_all, worn_state
 from workflow.case.loading import load_case
 from workflow.case.text.plain import counted
 from workflow.layout.declared import Arrays
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.rig.rig_model import RigModel
 from workflow.models.vibration.structure import VibratingStructure
 from workflow.shell.terminal.reporter import Reporter
@@ -63,10 +64,11 @@ def wear_nodes(
         worn = _worn_state(run, cycle, state, cycles, taken)
         if worn.numbers["step_error"] > wear.tolerance:
             reporter.warn(
+                WarningKind.LONG_WEAR_STEPS,
                 f"{cycles:g} cycles: wear steps cause an error of "
                 f"{worn.numbers['step_error']:.2g} of depth or volume, above wear.tolerance "
                 f"{wear.tolerance:g}: lower it, or raise resolution.samples or "
-                "resolution.harmonics"
+                "resolution.harmonics",
             )
         return worn
 

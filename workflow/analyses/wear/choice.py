@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from workflow.case.text.readable import percent
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.terminal.reporter import Reporter
 
 # Relative tolerance on an error that equals its allowed part except for rounding.
@@ -93,4 +94,4 @@ def report_choice(
             reporter.say(f"{error}, every share met; probes took {seconds:.1f} s")
     if not record["met"]:
         missed = ", ".join(d["entry"] for d in record["decisions"] if not d["met"])
-        reporter.warn(f"{error}, shares not met: {missed}")
+        reporter.warn(WarningKind.CHOICE_INACCURATE, f"{error}, shares not met: {missed}")

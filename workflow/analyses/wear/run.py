@@ -35,6 +35,7 @@ from workflow.analyses.wear.structures.resultants.writing import marched
 from workflow.analyses.wear.translation import check_section
 from workflow.analyses.wear.worn.worn_structure import nonlinearity_sentence
 from workflow.errors import MethodFailed, UserError
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.budget.budget import interface_outcomes
 from workflow.models.contact import ContactEnd, last_cycle
 from workflow.models.contacts import FaceContacts
@@ -80,7 +81,7 @@ def _compute(
     """
     case, reporter = run.case, run.reporter
     for warning in case.surface_warnings():
-        reporter.warn(warning)
+        reporter.warn(*warning)
     model = wear_model(case)
     source = model.loads(DiskStore())
     faces = meshed_faces(case, source, reporter)
@@ -170,8 +171,9 @@ def _check_structure(
     warn_of_structure(case, structure, reporter)
     if case.friction_evolves and case.recoupling.resultants == "constant":
         reporter.warn(
+            WarningKind.FRICTION_KEPT,
             "friction.evolution: the structure keeps its first coefficient (coupling.resultants: "
-            "constant)"
+            "constant)",
         )
     if structure.model.nonlinearity.check:
         with reporter.stage("nonlinearity check"):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.run_time import Extent
+from workflow.messages.warning_kinds import Notice
 from workflow.shell.analysis import as_written
 from workflow.shell.memory import Memory, factor_bytes
 
@@ -61,5 +62,5 @@ class WearStructure(Generic[AnyWearCase]):
     extent: Callable[[AnyWearCase], Extent]
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
-    warnings: Callable[[AnyWearCase, FaceContact, float], Iterable[str]] = lambda *_: ()
+    warnings: Callable[[AnyWearCase, FaceContact, float], Iterable[Notice]] = lambda *_: ()
     settings: Callable[[AnyWearCase], Mapping[str, str]] = lambda _: {}

@@ -18,6 +18,7 @@ from sa_solver.types import Array
 from wear.coupled_state import Observer, observed
 from workflow.errors import MethodFailed, ModelWarning
 from workflow.layout.declared import declared
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.rig.laws import Laws
 from workflow.models.rig.layout import CURVES
 from workflow.models.rig.rig_model import RigModel
@@ -144,12 +145,11 @@ class MotionModel:
         with observed(observers, "motion"):
             motion = self.motion(steps, reached)
         if motion.error > LARGEST_ERROR:
-            warnings.warn(
+            text = (
                 f"the time steps cause an error of {100.0 * motion.error:.1f} % of the largest "
-                "displacement: take shorter ones",
-                ModelWarning,
-                stacklevel=2,
+                "displacement: take shorter ones"
             )
+            warnings.warn(ModelWarning(WarningKind.LONG_TIME_STEPS, text), stacklevel=2)
         curves, described = curves_of(self.rig, self.force, motion), declared(CURVES)
         return xr.Dataset(
             {name: described[name].variable(values) for name, values in curves.items()},

@@ -18,7 +18,7 @@ from wear.coupled_state import Observer
 from wear.laws import WearLaw
 from wear.steps.marching import rest
 from wear.steps.steppers import ExplicitStepper
-from workflow.errors import MethodFailed, UserError
+from workflow.errors import MethodFailed, TooCoarse, UserError
 from workflow.layout.declared import declared
 from workflow.models.specimens.reduced import ReducedSpecimens, SpecimenPair
 from workflow.models.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
@@ -194,7 +194,7 @@ class FrettedSpecimens:
                 "raise load_path.stroke or friction.coefficient, or give wear.cycles"
             )
         if state.wear.any() and np.isinf(state.stable_cycles):
-            raise UserError(
+            raise TooCoarse(
                 f"mesh.pad_elements: only one node of the pad touches at {force}, too few to wear: "
                 "raise it, or load_path.normal_forces"
             )

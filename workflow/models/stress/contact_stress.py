@@ -23,6 +23,7 @@ from wear.contact.face_loads import FaceLoads
 from wear.contact.tractions import CycleTractions
 from wear.cracking.bulk_stress import BulkStress
 from wear.cracking.life import Ruiz, findley, smith_watson_topper
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.contact import FaceContact
 from workflow.models.stress.body_stress import (
     Planes,
@@ -108,21 +109,23 @@ class InterfaceStress:
         )
 
     @property
-    def carried_warning(self) -> str:
-        """Warning about the stress that a structure carries past the contact; empty without one."""
+    def carried_warning(self) -> Notice | None:
+        """Warning about the stress that a structure carries past the contact, if there is one."""
         if not self.bulk:
-            return (
+            return Notice(
+                WarningKind.UNCERTAIN_CARRIED_STRESS,
                 f"{self.name}: too few nodes near the contact to know what the structure carries "
                 "beyond the contact: the stress under it is that of its tractions alone; refine "
-                "the mesh there"
+                "the mesh there",
             )
         if not self.uncertain:
-            return ""
-        return (
+            return None
+        return Notice(
+            WarningKind.UNCERTAIN_CARRIED_STRESS,
             f"{self.name}: what the structure carries beyond the contact is uncertain by "
             f"{100.0 * self.uncertain:.1f} % of the deformation of half-spaces, and the stress "
             "under it may be wrong by as much, and twice as much near the ends of the face: "
-            "refine the mesh of the contact face"
+            "refine the mesh of the contact face",
         )
 
     @property

@@ -15,6 +15,7 @@ from sa_solver.half_space.stress import von_mises
 from sa_solver.half_space.subsurface import COMPONENTS
 from sa_solver.types import Array
 from workflow.layout.declared import declared
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.stress.contact_stress import STUCK_SHARE, InterfaceStress
 from workflow.models.stress.layout import BODY, LIFE, MOMENTS, SECTION, SECTION_AXES
 from workflow.models.stress.structure_stress import StressedStructure, formed_meshes
@@ -65,23 +66,26 @@ class StressResults:
                 groups[f"bodies/{body.name}"] = _body(bodies, fields)
         return groups
 
-    def faults(self, peak: int) -> Iterator[str]:
+    def faults(self, peak: int) -> Iterator[Notice]:
         """Return what the stress lacks; ``peak`` is the increment of peak load."""
         if self.structure is not None and self._formed[1]:
-            yield f"{self._formed[1]}: points of bodies are those of the worn shape alone"
+            text = f"{self._formed[1]}: points of bodies are those of the worn shape alone"
+            yield Notice(WarningKind.WORN_MESH_SIMPLIFIED, text)
         for stress in self.contacts:
             if (stuck := stress.stuck[peak]) > STUCK_SHARE:
-                yield (
+                yield Notice(
+                    WarningKind.UNKNOWN_SHEAR,
                     f"{stress.name}: {100.0 * stuck:.0f} % of the peak load sticks, and method "
-                    "normal does not know its shear, which section and life lack: use method full"
+                    "normal does not know its shear, which section and life lack: use method full",
                 )
             elif count := int((stress.stuck > STUCK_SHARE).sum()):
-                yield (
+                yield Notice(
+                    WarningKind.UNKNOWN_SHEAR,
                     f"{stress.name}: the life leaves out {count} increments, in which method "
-                    "normal does not know the shear of a contact that sticks: use method full"
+                    "normal does not know the shear of a contact that sticks: use method full",
                 )
-            if self.structure is not None and stress.carried_warning:
-                yield stress.carried_warning
+            if self.structure is not None and (warning := stress.carried_warning):
+                yield warning
 
 
 def _section(stress: InterfaceStress) -> xr.Dataset:

@@ -136,6 +136,6 @@ class VibrationModel:
             name = self.structure.driving.amount.as_text(force)
             with observed(observers, name):
                 responses[name] = self.response(force, steps, observers)
-            for message in responses[name].faults(self.sweep.accuracy):
-                warnings.warn(f"{name}: {message}", ModelWarning, stacklevel=2)
+            for kind, text in responses[name].faults(self.sweep.accuracy):
+                warnings.warn(ModelWarning(kind, f"{name}: {text}"), stacklevel=2)
         return VibrationResults(self.structure, self.sweep.span, responses).tree()

@@ -13,6 +13,7 @@ from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
 from workflow.layout.declared import declared
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.vibration.layout import AMPLITUDES, MOTIONS, linear_limits
 from workflow.models.vibration.motions import amplitudes_of, peaks_inside
 from workflow.models.vibration.structure import VibratingStructure
@@ -47,25 +48,28 @@ class ForcedResponse:
         """The equations at the resolution of the resonance."""
         return self.branch.problem.with_resolution(self.resonance.resolution)
 
-    def faults(self, accuracy: Accuracy | None) -> Iterator[str]:
+    def faults(self, accuracy: Accuracy | None) -> Iterator[Notice]:
         """Return what makes the curve or its resonance wrong though all solvers converge.
 
         Motions are to have the ``accuracy``, or errors below :data:`LARGEST_ERROR` without one.
         """
         if self.branch.message:
-            yield self.branch.message
+            yield Notice(WarningKind.CURVE_ENDS, self.branch.message)
         if not peaks_inside(self.columns["amplitude"][:, -1]):
-            yield "no resonance: the largest motion is at an end of the curve"
+            text = "no resonance: the largest motion is at an end of the curve"
+            yield Notice(WarningKind.NO_RESONANCE, text)
         if accuracy is None and self.error > LARGEST_ERROR:
-            yield (
+            yield Notice(
+                WarningKind.INACCURATE_MOTION,
                 f"the motion has an error of {self.error:.1e}: give an accuracy, or a resolution "
-                "with more harmonics and samples"
+                "with more harmonics and samples",
             )
         if accuracy is not None and self.error > accuracy.tolerance:
-            yield (
+            yield Notice(
+                WarningKind.INACCURATE_MOTION,
                 f"the motion has an error of {self.error:.1e} at the finest resolution, above the "
                 f"tolerance {accuracy.tolerance:g}: allow higher harmonics and more samples in the "
-                "accuracy"
+                "accuracy",
             )
 
 

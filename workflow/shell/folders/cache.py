@@ -25,6 +25,7 @@ from fe_models.joints.joint import JointResolvent
 from fe_models.solvers.symmetry import Mirror, SplitMatrix
 from fe_models.structure import FIELDS, CycleSolution, Structure
 from sa_solver.types import Array
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.folders.store import DamagedFile, read_arrays, write_arrays
 
 LOG = logging.getLogger(__name__)
@@ -188,7 +189,7 @@ def _load(name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
         os.utime(path)
         return read_arrays(path)
     except DamagedFile as error:
-        LOG.warning("cache: %s; computed again", error)
+        LOG.warning(WarningKind.DAMAGED_CACHE.marked(f"cache: {error}; computed again"))
     except OSError:
         pass
     return None

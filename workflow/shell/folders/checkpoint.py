@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from workflow.case.fields import shown
-from workflow.errors import UserError
+from workflow.errors import RunChanged
 from workflow.shell.folders.folder import CHOICE, OutputFolder
 from workflow.shell.folders.store import DamagedFile, checked_digest, read_arrays, write_arrays
 
@@ -49,21 +49,23 @@ def load(folder: OutputFolder, provenance: Mapping[str, Any]) -> StoredState:
         begun = json.loads(arrays.pop(PROVENANCE))
         jumps = [digest.decode("ascii") for digest in arrays.pop(JUMPS)]
     except DamagedFile as error:
-        raise UserError(f"{error}; {folder.again}") from error
+        raise RunChanged(f"{error}; {folder.again}") from error
     except (OSError, KeyError) as error:
-        raise UserError(f"{folder.checkpoint}: cannot be read ({error}); {folder.again}") from error
+        raise RunChanged(
+            f"{folder.checkpoint}: cannot be read ({error}); {folder.again}"
+        ) from error
     if begun != provenance:
-        raise UserError(f"{_changed(folder, begun, provenance)}; put that back, or {folder.again}")
+        raise RunChanged(f"{_changed(folder, begun, provenance)}; put that back, or {folder.again}")
     for number, kept in enumerate(jumps):
         path = folder.jump(number)
         try:
             same = checked_digest(path) == kept
         except OSError:
-            raise UserError(f"{path}: missing or unreadable; {folder.again}") from None
+            raise RunChanged(f"{path}: missing or unreadable; {folder.again}") from None
         except DamagedFile as error:
-            raise UserError(f"{error}; {folder.again}") from error
+            raise RunChanged(f"{error}; {folder.again}") from error
         if not same:
-            raise UserError(f"{path}: of another run than {folder.checkpoint}; {folder.again}")
+            raise RunChanged(f"{path}: of another run than {folder.checkpoint}; {folder.again}")
     return StoredState(arrays, attributes, jumps)
 
 

@@ -20,7 +20,7 @@ from typing import Any
 
 from workflow.case.sections import Case
 from workflow.case.text.writing import dump_case
-from workflow.errors import UserError
+from workflow.errors import FolderTaken, RunChanged
 from workflow.shell.folders.lock import LOCK, locked
 from workflow.shell.folders.store import (
     PARTIAL_NAME,
@@ -111,7 +111,7 @@ class OutputFolder:
         """Return the paths of several entries. Raises UserError if one exists, unless ``force``."""
         there = [path for name in entries if os.path.lexists(path := self.root / name)]
         if there and not force:
-            raise UserError(f"{there[0]}: exists; give another folder, or --force")
+            raise FolderTaken(f"{there[0]}: exists; give another folder, or --force")
         return [self.reserve(name, what) for name, what in entries.items()]
 
     @contextmanager
@@ -208,13 +208,13 @@ class OutputFolder:
         except (ValueError, LookupError, TypeError, AttributeError):
             kept = None
         if kept is None or kept != json_digest(summary):
-            raise UserError(f"{self.summary}: damaged, or of an older version; {self.again}")
+            raise RunChanged(f"{self.summary}: damaged, or of an older version; {self.again}")
         return summary
 
     def check_run(self) -> None:
         """Raise UserError if the folder contains no run."""
         if not self.case.exists():
-            raise UserError(f"{self.root}: no run of fretscale here (case.yaml is missing)")
+            raise RunChanged(f"{self.root}: no run of fretscale here (case.yaml is missing)")
 
     def check_ended(self) -> None:
         """Raise UserError if the folder contains no run or an unfinished one."""
@@ -223,7 +223,7 @@ class OutputFolder:
             how = f"start it again with `{self.run_command}`"
             if self.lists_state:
                 how = f"continue with `{self.resume_command}`"
-            raise UserError(f"{self.root}: this run is not finished; {how}")
+            raise RunChanged(f"{self.root}: this run is not finished; {how}")
 
     def check_finished(self, case: Mapping[str, Any]) -> None:
         """Raise UserError if a file of the finished run or the values of its case have changed."""
@@ -239,7 +239,7 @@ class OutputFolder:
     def _check(self, name: str, kept: str | None, case: Mapping[str, Any]) -> None:
         path = self.root / name
         if kept != (json_digest(case) if path == self.case else file_digest(path)):
-            raise UserError(f"{path}: differs from the run in {self.root}; {self.again}")
+            raise RunChanged(f"{path}: differs from the run in {self.root}; {self.again}")
 
     @property
     def run_command(self) -> str:
@@ -268,7 +268,7 @@ class OutputFolder:
         try:
             return json.loads(read_bytes(path)) if path.exists() else None
         except ValueError as error:
-            raise UserError(f"{path}: damaged; {self.again}") from error
+            raise RunChanged(f"{path}: damaged; {self.again}") from error
 
     # --- owner ----------------------------------------------------------------------------------
 
@@ -344,16 +344,16 @@ class OutputFolder:
         """Raise UserError if the folder holds entries of an unknown owner."""
         if self.manifest is None and self._entries():
             what = f"not empty and no {self._kind} of fretscale; give another folder{remedy}"
-            raise UserError(f"{self.root}: {what}")
+            raise FolderTaken(f"{self.root}: {what}")
 
     def _refuse_other(self, case: Case) -> None:
         self.refuse_foreign(", or --force")
         if self.case.exists() and not self._holds(case):
-            raise UserError(
+            raise FolderTaken(
                 f"{self.root}: holds the results of another case; give another folder, or --force"
             )
         if not self.summary.exists() and self.checkpoint.exists():
-            raise UserError(
+            raise FolderTaken(
                 f"{self.root}: holds an unfinished run of this case; continue it with "
                 f"`{self.resume_command}`, or start again with --force"
             )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from workflow.errors import UNWRITTEN, one_line
+from workflow.messages.warning_kinds import WarningKind
 
 
 class Isolation:
@@ -16,7 +17,7 @@ class Isolation:
     on a full disk: the run then stops as for any other file, and can be resumed once there is room.
     """
 
-    def __init__(self, warn: Callable[[str], None]) -> None:
+    def __init__(self, warn: Callable[[WarningKind, str], None]) -> None:
         self._warn = warn
         self._failed: set[str] = set()
 
@@ -34,4 +35,5 @@ class Isolation:
             if what not in self._failed:
                 self._failed.add(what)
                 reason = f"{type(error).__name__}: {one_line(error)}"
-                self._warn(f"{what}: not written ({reason}); the results are complete")
+                text = f"{what}: not written ({reason}); the results are complete"
+                self._warn(WarningKind.NOT_WRITTEN, text)

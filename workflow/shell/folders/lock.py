@@ -19,7 +19,7 @@ from pathlib import Path
 
 from filelock import lock_descriptor
 
-from workflow.errors import UserError
+from workflow.errors import FolderInUse, UserError
 from workflow.shell.folders.store import check_regular
 
 LOCK = ".fretscale.lock"
@@ -50,7 +50,7 @@ def locked(root: Path, patience: float = 0.0, take_over: bool = False) -> Iterat
         left = _read(file)
         holder = _holder(left)
         if left and not take_over and not (alone and left.get("host") == socket.gethostname()):
-            raise UserError(
+            raise FolderInUse(
                 f"{root}: apparently in use by {holder}; wait for its end, or remove {path} if it "
                 "is gone"
             )
@@ -105,7 +105,7 @@ def _opened(path: Path, patience: float) -> tuple[int, bool]:
         holder = _holder(_read(file))
         os.close(file)
         if time.monotonic() >= end:
-            raise UserError(
+            raise FolderInUse(
                 f"{path.parent}: in use by {holder}; wait for its end, or give another folder"
             )
         time.sleep(LOOK)

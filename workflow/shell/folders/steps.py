@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from workflow.case.text.plain import counted
-from workflow.errors import UserError
+from workflow.errors import RunChanged, UserError
 from workflow.shell.analysis import Run
 from workflow.shell.folders import checkpoint
 from workflow.shell.folders.checkpoint import StoredState
@@ -125,7 +125,7 @@ class StoredSteps:
         """Return the warnings so far; those of a step are stored with it."""
         return []
 
-    def _warn(self, line: str) -> None:
+    def _repeat(self, line: str) -> None:
         """Repeat a warning of a restored step."""
 
     def _spend(self, seconds: float) -> None:
@@ -175,7 +175,7 @@ class StoredSteps:
         if written != name:
             raise self._of_another_version(f"{written} in the place of {name}")
         for line in warnings:
-            self._warn(line)
+            self._repeat(line)
         return value
 
 
@@ -226,8 +226,8 @@ class RunSteps(StoredSteps):
     def _warnings(self) -> list[str]:
         return self._reporter.warnings
 
-    def _warn(self, line: str) -> None:
-        self._reporter.warn(line)
+    def _repeat(self, line: str) -> None:
+        self._reporter.repeat(line)
 
     def _spend(self, seconds: float) -> None:
         spent = self._reporter.seconds
@@ -235,7 +235,7 @@ class RunSteps(StoredSteps):
 
     def _of_another_version(self, wrong: object) -> UserError:
         of = f"{self._folder.jumps}: of another version of fretscale"
-        return UserError(f"{of} ({wrong}); {self._folder.again}")
+        return RunChanged(f"{of} ({wrong}); {self._folder.again}")
 
     def _of_files(self, marches: Mapping[Place, bytes]) -> dict[Place, bytes]:
         """Return the stored results of steps."""

@@ -21,7 +21,7 @@ from uuid import uuid4
 
 import h5py
 
-from workflow.errors import UNWRITTEN, UserError
+from workflow.errors import UNWRITTEN, RunChanged
 
 # Part of the names of files that are being written; it precedes their ending, which some writers
 # depend on.
@@ -32,7 +32,7 @@ PARTIAL_NAME = re.compile(rf"\..+\.\d+{re.escape(PARTIAL)}(\.\w+)?")
 SEAL = 512
 
 
-class DamagedFile(UserError):
+class DamagedFile(RunChanged):
     """Error for a file whose content differs from what was written under its name."""
 
 

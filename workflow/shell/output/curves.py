@@ -11,7 +11,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.case.text.readable import suited
-from workflow.errors import UserError
+from workflow.errors import RunChanged
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.quantities import ANY, LAST, CurvesOf
 from workflow.shell.output.tables import heading
@@ -71,7 +71,7 @@ def curves_in(file: h5py.File, wanted: CurvesOf) -> Iterator[Curve]:
     """
     for y, words in _walk(file, wanted.y.split("/"), []):
         if not (y.is_scale or y.dims[0]):
-            raise UserError(
+            raise RunChanged(
                 f"{file.filename}: of an older version of fretscale; run the case again"
             )
         if not wanted.x or wanted.x in y.parent:

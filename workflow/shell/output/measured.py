@@ -27,6 +27,7 @@ from workflow.case.sections import Case, Measured
 from workflow.case.text.readable import everyday_unit, percent, readable
 from workflow.errors import UserError
 from workflow.layout.declared import Layout
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.shell.output.curves import Curve, curves_in
 from workflow.shell.output.quantities import CurvesOf
 
@@ -234,16 +235,18 @@ def tell_measured(case: Case, curves: Sequence[CurvesOf], results: Path) -> list
     return content
 
 
-def comparison_warnings(content: Sequence[dict[str, Any]]) -> Iterator[str]:
+def comparison_warnings(content: Sequence[dict[str, Any]]) -> Iterator[Notice]:
     """Yield a warning for each failed comparison and for points outside the computed range."""
     for number, one in enumerate(content):
         if "refused" in one:
-            yield f"measured.{number}: not compared: {one['refused']}"
+            text = f"measured.{number}: not compared: {one['refused']}"
+            yield Notice(WarningKind.NOT_COMPARED, text)
         elif one["outside"]:
             places = ", ".join(str(readable(x, one["at_unit"])) for x in one["outside"])
-            yield (
+            yield Notice(
+                WarningKind.NOT_COMPARED,
                 f"measured.{number}: {one['curve']}: not computed at {places}, which are not "
-                "compared"
+                "compared",
             )
 
 

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 from sa_solver.types import Frame, Grid
 from workflow.case.sections import Case
 from workflow.case.text.writing import dump_case
-from workflow.errors import UserError
+from workflow.errors import RunChanged
 from workflow.layout.declared import Arrays, Layout
 from workflow.shell.analysis import Run
 from workflow.shell.folders.store import replacing_hdf5
@@ -149,7 +149,7 @@ def read_contents(path: Path, kind: type[Any] | None) -> Any:
     try:
         return None if kind is None else TypeAdapter(kind).validate_json(text)
     except ValidationError as error:
-        raise UserError(
+        raise RunChanged(
             f"{path}: has no contents list: of another version; run the case again"
         ) from error
 

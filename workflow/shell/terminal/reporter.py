@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from sa_solver.types import Progress
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.folders.isolation import Isolation
 from workflow.shell.folders.store import check_regular
 from workflow.shell.forecast import Forecast, about
@@ -137,8 +138,12 @@ class Reporter:
         with self.isolated(TERMINAL):
             console().print(line, markup=False, soft_wrap=True)
 
-    def warn(self, line: str) -> None:
-        """Show a warning once, and store it for the summary."""
+    def warn(self, kind: WarningKind, text: str) -> None:
+        """Show a warning once with its code, and store it for the summary."""
+        self.repeat(kind.marked(text))
+
+    def repeat(self, line: str) -> None:
+        """Show a warning that has its code already, unless it was shown before."""
         if line not in self.warnings:
             self.warnings.append(line)
             self.say(f"warning: {line}", always=True)

@@ -79,7 +79,7 @@ class Screen:
     """Rows of a run; nothing is shown unless it is ``on``, and its failures never end a run."""
 
     def __init__(self, on: bool, isolated: Isolation | None = None) -> None:
-        self._isolated = isolated or Isolation(lambda warning: None)
+        self._isolated = isolated or Isolation(lambda kind, text: None)
         columns = _columns(console().width)
         self._rows = _Rows(*columns, console=console(), transient=True, expand=True)
         self._between = self._rows.add_task("working", total=None, at="", left="")

@@ -106,11 +106,11 @@ def test_parts_of_opposite_sign_cancel_but_for_what_each_is_uncertain_by() -> No
 def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> None:
     errors = {"depth": ERROR, "worn_peak_pressure": ERROR}
     assert warning_of("pad", errors, 0.05, REMEDIES) is None
-    line = warning_of("pad", errors, 0.04, REMEDIES)
-    assert line is not None
-    assert "depth 4.6 %" in line
-    assert "worn peak" not in line  # edges may be farther off
-    assert REMEDIES["mesh"] in line
+    warning = warning_of("pad", errors, 0.04, REMEDIES)
+    assert warning is not None
+    assert "depth 4.6 %" in warning.text
+    assert "worn peak" not in warning.text  # edges may be farther off
+    assert REMEDIES["mesh"] in warning.text
 
 
 def loads_of(model: WearModel) -> LoadSource:
@@ -164,7 +164,7 @@ def test_error_of_a_peak_due_to_steps(step, tmp_path) -> None:
 def _advice(warnings: list[str], about: str) -> str:
     """Return the setting that a warning names, as ``--set`` takes it."""
     (line,) = (line for line in warnings if about in line)
-    key, value = re.search(r"(wear\.[a-z.]+): (\{[^}]*\}|[\d.e+-]+ \S+)[);]*$", line).groups()
+    key, value = re.search(r"(wear\.[a-z.]+): (\{[^}]*\}|[\d.e+-]+ \S+)[);]* \[", line).groups()
     return f"{key}={value}"
 
 

@@ -12,6 +12,7 @@ from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.analyses.wear.structures.mesh.elements import folded_elements
 from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.kinds import load_case
+from workflow.messages.warning_kinds import WarningKind
 
 pytestmark = [pytest.mark.usefixtures("reads_here")]
 
@@ -50,5 +51,7 @@ def test_edges_that_are_taken_straight_give_a_warning(tmp_path):
     arc = foot.mesh.boundaries["sole"][:3]
     midsides[arc] = foot.mesh.p[:, foot.mesh.facets[:, arc]].mean(axis=1).T
     reported = replace(mesh, bodies=(block, replace(foot, midsides=midsides)))
-    (warning,) = folded_elements(reported, imported)
-    assert warning.startswith("foot: midside nodes fold some elements, so 3 edges of ")
+    ((kind, text),) = folded_elements(reported, imported)
+    assert kind is WarningKind.FOLDED_ELEMENTS
+    assert text.startswith("foot: ")
+    assert "3 edges" in text

@@ -40,9 +40,9 @@ def test_density_is_for_loads_on_the_mass(blocks):
     assert load_case(blocks, bare).material(1).density == 0.0
     load = "{kind: acceleration, acceleration: [0, 0, 9810], path: [1, 1, 1, 1]}"
     line = refused(blocks, *bare, f"structure.loads.1={load}")
-    assert line.endswith(
+    assert (
         "materials.body_1.density: missing, but a load of acceleration acts on the mass; allowed: "
-        "mass per volume [t/mm^3], such as 4430 kg/m^3"
+        "mass per volume [t/mm^3], such as 4430 kg/m^3" in line
     )
     named = ["materials.body_1=304L", "materials.body_2=304L"]
     case = load_case(blocks, [*named, f"structure.loads.1={load}"])

@@ -22,6 +22,7 @@ from workflow.case.fields import Quantity, Whole, shown
 from workflow.case.files.input_files import InputFileError
 from workflow.case.sections import Section, Title, disagreement, entry, together
 from workflow.case.text.plain import counted, plain, shares
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.shell.memory import Memory, factor_bytes
 from workflow.shell.run_time import factors
 
@@ -307,39 +308,44 @@ class MatrixBody(JointedBody, Matrices):
             return None
         return _frequencies(self.matrices, self.matrices.stamps)
 
-    def plausibility_warnings(self, highest: float) -> Iterator[str]:
+    def plausibility_warnings(self, highest: float) -> Iterator[Notice]:
         """Yield plausibility warnings about entries, for motions up to ``highest`` [Hz]."""
         if self.massless is not None and highest > SOFT * self.massless:
-            yield (
+            yield Notice(
+                WarningKind.MASSLESS_TOO_LOW,
                 f"structure.massless: {plain(self.massless, 'Hz')} is too low: at "
                 f"{plain(highest, 'Hz', 3)}, the highest frequency of the motion, what has no "
-                f"mass is {shares((highest / self.massless) ** 2)} too soft"
+                f"mass is {shares((highest / self.massless) ** 2)} too soft",
             )
         matrices = self.matrices.read()
         count = len(matrices.unknowns)
         if count > MANY and not self.retained:
-            yield (
+            yield Notice(
+                WarningKind.NOT_REDUCED,
                 f"structure.retained: none, so that all {count} unknowns are kept; usual for more "
-                f"than {MANY}: some points, and modes"
+                f"than {MANY}: some points, and modes",
             )
         if names := matrices.offered.get("damping"):
-            yield (
+            yield Notice(
+                WarningKind.DAMPING_NOT_TAKEN,
                 f"structure.matrices.damping: no matrix with a usual name; {' and '.join(names)} "
-                f"could be it: damping: {names[0]}"
+                f"could be it: damping: {names[0]}",
             )
         for axis, mass in matrices.moved_mass().items():
             if mass and not LIGHTEST <= mass <= HEAVIEST:
-                yield (
+                yield Notice(
+                    WarningKind.UNUSUAL_MATRICES,
                     f"structure.matrices.units: the mass along {axis} is {plain(mass, 't', 3)}: "
-                    "are they right?"
+                    "are they right?",
                 )
                 break
         lowest = self.lowest_frequencies()
         elastic = np.empty(0) if lowest is None else lowest[lowest > 0.0]
         if len(elastic) and not SLOWEST <= elastic[0] <= FASTEST:
-            yield (
+            yield Notice(
+                WarningKind.UNUSUAL_MATRICES,
                 f"structure.matrices.units: the lowest frequency above 0 is {elastic[0]:.3g} Hz: "
-                "are they right, including mass?"
+                "are they right, including mass?",
             )
 
 

@@ -32,6 +32,7 @@ from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import reduced_pair
 from workflow.case.loading import load_case
 from workflow.errors import EntryError, UserError
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.rig.rig_model import JointEntry, JointNodes, RigModel
 from workflow.models.specimens.reduced import ReducedSpecimens
 from workflow.shell.terminal.reporter import Reporter
@@ -294,8 +295,9 @@ def _warn_of_slow(body: MatrixBody, reduced: ReducedModel, reporter: Reporter) -
     fastest = np.sqrt(square[0]) / (2.0 * np.pi)
     if slowest < np.sqrt(RIGID) * fastest:
         reporter.warn(
+            WarningKind.MODE_TAKEN_AS_RIGID,
             f"the mode of {slowest:.3g} Hz is so far below the fastest, {fastest:.3g} Hz, that it "
-            "is taken for a rigid motion: reduce by structure.retained and structure.modes"
+            "is taken for a rigid motion: reduce by structure.retained and structure.modes",
         )
 
 

@@ -29,6 +29,7 @@ from workflow.case.fields import Ascending, Quantity
 from workflow.case.sections import Case, Title, disagreement, entry, in_its_place, one_of
 from workflow.case.source import Source
 from workflow.case.text.plain import shares
+from workflow.messages.warning_kinds import Notice
 from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
 
 if TYPE_CHECKING:
@@ -169,7 +170,7 @@ class VibrationCaseBase(Case):
         mean = self.moves_mean or any(order % 2 == 0 for order in excited)
         return tuple(sorted({*harmonics, *excited} | ({0} if mean else set())))
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         yield from about_modes(
             "frequencies", self.frequencies, self.structure, self._stuck, self._shares
         )

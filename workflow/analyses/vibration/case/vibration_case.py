@@ -31,6 +31,7 @@ from workflow.analyses.vibration.case.sections import FurtherStart, LoopsAt, Non
 from workflow.case.fields import Ascending
 from workflow.case.sections import disagreement, entry
 from workflow.case.source import Source
+from workflow.messages.warning_kinds import Notice, WarningKind
 
 
 class VibrationCase(DrivenMass):
@@ -148,13 +149,14 @@ class VibrationCase(DrivenMass):
     def moves_mean(self) -> bool:
         return any(law.moves_mean for law in self.laws)
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         yield from super().plausibility_warnings()
         uneven = [law for law in self.laws if isinstance(law, ElasticJoint) and law.moves_mean]
         if uneven and not any(number % 2 == 0 for number in self.harmonics if number > 0):
-            yield (
+            yield Notice(
+                WarningKind.EVEN_HARMONICS_MISSING,
                 f"resolution.harmonics: no even ones, but a joint of law {uneven[0].law} differs "
-                "on its two sides and needs them; list them, such as [0, 1, 2, 3, 4, 5]"
+                "on its two sides and needs them; list them, such as [0, 1, 2, 3, 4, 5]",
             )
 
     @model_validator(mode="after")

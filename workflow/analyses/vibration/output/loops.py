@@ -21,6 +21,7 @@ from wear.joints.measured.measured_loops import measure_loops
 from wear.joints.periodic.march import SLIP, STICK
 from workflow.analyses.vibration.following import VibrationRun
 from workflow.analyses.vibration.output.outcome import Curves
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.rig.laws import grouped
 from workflow.models.vibration.structure import VibratingStructure
 
@@ -46,7 +47,10 @@ def loops_of(run: VibrationRun, branch: ResponseBranch) -> tuple[Curves, ...]:
         problem = branch.problem.with_resolution(Resolution(every, samples))
         motion = run.steps("loop", partial(_known, problem, frequency, start))
         if not motion.converged:
-            reporter.warn(f"{reported}: no loop at {frequency:g} Hz: {motion.message}")
+            reporter.warn(
+                WarningKind.MOTION_NOT_FOUND,
+                f"{reported}: no loop at {frequency:g} Hz: {motion.message}",
+            )
             continue
         number = None if case.loops.joints is None else case.loops.joints - 1
         load = case.laws[number or 0].normal_load

@@ -10,6 +10,7 @@ import numpy as np
 from sa_solver.types import Array
 from workflow.analyses.wear.output.layout import RESULTS
 from workflow.case.text.readable import percent
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.budget.names import PARTS
 from workflow.models.budget.parts import ResultError
 
@@ -64,7 +65,7 @@ def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
 
 def warning_of(
     name: str, errors: Mapping[str, ResultError], accuracy: float, settings: Mapping[str, str]
-) -> str | None:
+) -> Notice | None:
     """Return a warning about results beyond ``accuracy``, with a setting for the largest part."""
     allowed = {name: accuracy * (AT_EDGES if name in EDGES else 1.0) for name in errors}
     beyond = {name: error for name, error in errors.items() if error.total > allowed[name]}
@@ -79,7 +80,8 @@ def warning_of(
     most = max(shares, key=shares.__getitem__)
     listed = ", ".join(f"{RESULTS[name]} {percent(error.total)}" for name, error in beyond.items())
     asked = f"{100.0 * accuracy:g} % ({AT_EDGES:g} times that at worn edges)"
-    return (
+    return Notice(
+        WarningKind.ACCURACY_EXCEEDED,
         f"{name}: estimated errors exceed the accuracy of {asked}: {listed}; mainly due to "
-        f"{most}: {settings[most]}"
+        f"{most}: {settings[most]}",
     )

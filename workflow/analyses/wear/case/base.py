@@ -27,6 +27,7 @@ from workflow.case.fields import shown
 from workflow.case.plausibility import idle_steps, uneven_cells
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 from workflow.case.text.plain import entries, of_bodies, plain, shares, times
+from workflow.messages.warning_kinds import Notice
 
 # Names of the entries of summary and results, which interfaces must not have.
 RESERVED = (
@@ -208,7 +209,7 @@ class WearCase(WithScans, Case):
         """Return the extent of the contact grid along x and y [mm], None if only a mesh has it."""
         return None
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         yield from idle_steps("wear.step.cycles", self.wear.step.cycles, self.wear.cycles)
         if (sides := self.face_sides()) is not None:
             yield from uneven_cells(sides, self.contact.grid)

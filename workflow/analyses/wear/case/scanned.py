@@ -15,6 +15,7 @@ from sa_solver.types import Array, Grid
 from workflow.analyses.contact.surfaces import LOST, SurfacesOfTwo
 from workflow.case.sections import disagreement
 from workflow.case.text.plain import plain
+from workflow.messages.warning_kinds import Notice
 
 if TYPE_CHECKING:
     from fe_models.meshes.structure_mesh import Interface
@@ -118,7 +119,7 @@ class ScannedFace:
         for name, text in self.surfaces.reported(self.summary()).items():
             yield f"surface {name.removeprefix('body_')}", f"{self.name}: {text}"
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         """Yield plausibility warnings about units and a grid too coarse for the roughness."""
         yield from self.surfaces.plausibility_warnings(self.grid, self.key)
 
@@ -147,7 +148,7 @@ class WithScans:
         faces = {face.name: face.summary() for face in self.scanned()}
         return {"surfaces": faces} if faces else {}
 
-    def surface_warnings(self) -> Iterator[str]:
+    def surface_warnings(self) -> Iterator[Notice]:
         """Yield the plausibility warnings about measured surfaces."""
         for face in self.scanned():
             yield from face.plausibility_warnings()

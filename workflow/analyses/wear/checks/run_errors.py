@@ -13,6 +13,7 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Duration
 from workflow.analyses.wear.structures import structure_of
 from workflow.case.text.readable import percent
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.budget.outcome import InterfaceOutcome
 from workflow.shell.terminal.reporter import Reporter
 
@@ -47,13 +48,14 @@ def warn_of_errors(
         settings = {**REMEDIES, **structure_of(case).settings(case), "steps": shorter}
         settings |= _of_link_and_coupling(case, shorter, drift)
         if beyond := warning_of(name, budget[name], case.accuracy, settings):
-            reporter.warn(beyond)
+            reporter.warn(*beyond)
         fewest = min(mission.stop - mission.start for mission in state.loads.missions)
         if len(state.paths) and fewest < FEW_INCREMENTS:
             reporter.warn(
+                WarningKind.FALSE_EDGES,
                 f"{name}: the bodies move over each other in only {fewest} increments per cycle "
                 "and wear false edges into each other: the worn peak pressure is too large, by a "
-                f"fifth with 16 increments and more with fewer; take {FEW_INCREMENTS}"
+                f"fifth with 16 increments and more with fewer; take {FEW_INCREMENTS}",
             )
 
 
@@ -108,12 +110,14 @@ def _warn_of_steps(
         allowed = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
     if wear.step.automatic and error > allowed:
         reporter.warn(
+            WarningKind.LONG_WEAR_STEPS,
             f"{name}: wear steps cause an estimated error of {percent(error)} of depth and volume, "
-            f"above wear.tolerance ({percent(allowed)}): take shorter steps ({shorter})"
+            f"above wear.tolerance ({percent(allowed)}): take shorter steps ({shorter})",
         )
     if estimate["pressure"] > PEAK:
         reporter.warn(
+            WarningKind.LONG_WEAR_STEPS,
             f"{name}: wear steps cause an estimated error of {percent(estimate['pressure'])} of "
             "the worn peak pressure and of what follows from it (fretting life): take shorter "
-            f"steps ({shorter})"
+            f"steps ({shorter})",
         )

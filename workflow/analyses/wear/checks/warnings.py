@@ -19,6 +19,7 @@ from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.contact import FaceContact, WornFaces, border_warnings
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
@@ -47,28 +48,34 @@ def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: 
     """Report remarks on the model, cycles that do not close, and faces that lose contact."""
     for text in case.remarks_on_nodes():
         reporter.say(text)
-    for remark in stage.remarks():
-        (reporter.warn if remark.is_warning else reporter.say)(remark.text)
+    for text, kind in stage.remarks():
+        if kind is None:
+            reporter.say(text)
+        else:
+            reporter.warn(kind, text)
     unworn = stage.unworn_cycle
     if unworn.closure > CLOSED:
         reporter.warn(
+            WarningKind.CYCLE_NOT_CLOSED,
             "the cycle that feeds the wear is not closed: the contact forces of the last two of "
-            f"{unworn.cycles} cycles differ by {percent(unworn.closure)} of the largest"
+            f"{unworn.cycles} cycles differ by {percent(unworn.closure)} of the largest",
         )
     imbalance = float(unworn.equilibrium.max())
     if imbalance > OUT_OF_BALANCE:
         reporter.warn(
+            WarningKind.OUT_OF_BALANCE,
             f"forces and moments on a body are out of balance by {imbalance:.1e} (relative): the "
             "stiffness at peak load does not suit the other increments; change "
-            "nonlinearity.stiffness"
+            "nonlinearity.stiffness",
         )
     for history in unworn.histories:
         name, P = history.interface.name, history.loads.P
         if P.max() <= 0.0:
-            reporter.warn(f"{name} is never closed: it does not wear")
+            reporter.warn(WarningKind.FACE_OPEN, f"{name} is never closed: it does not wear")
         elif P[stage.peak] <= 0.0:
             reporter.warn(
-                f"{name} is open at peak load: there is no pressure and no stress to show there"
+                WarningKind.FACE_OPEN,
+                f"{name} is open at peak load: there is no pressure and no stress to show there",
             )
         else:
             _warn_of_few_nodes(history, stage, reporter)
@@ -84,9 +91,10 @@ def _warn_of_few_nodes(
     least = FEWEST_NODES if face.line else FEWEST_NODES**2
     if pressed < min(least, len(face)):
         reporter.warn(
+            WarningKind.FEW_NODES,
             f"{face.name}: only {counted(pressed, 'node')} of a mesh of {_mesh_size(face):.2g} mm "
             f"carry the peak load, and {least} are needed to resolve a contact: its slip and tilt "
-            f"depend on the mesh; {stage.model.finer}"
+            f"depend on the mesh; {stage.model.finer}",
         )
 
 
@@ -102,9 +110,10 @@ def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Re
     share = float(waves / history.pressure[stage.peak].max())
     if share > FORM_SHARE:
         reporter.warn(
+            WarningKind.UNCERTAIN_FORM,
             f"{face.name}: the form of its faces is uncertain by {1e3 * unsure:.2g} µm, as the "
             f"mesh has only corner nodes; the peak pressure may be wrong by {percent(share)}: "
-            "give the bodies as CAD, or with midside nodes"
+            "give the bodies as CAD, or with midside nodes",
         )
 
 
@@ -129,9 +138,10 @@ def warn_of_file(case: ResultantsCase, reporter: Reporter) -> None:
     closures = [imported.closure or 0.0 for imported in case.loads().values()]
     if max(closures) > CLOSED:
         reporter.warn(
+            WarningKind.CYCLE_NOT_CLOSED,
             f"structure.file: {case.structure.file}: the cycle that feeds the wear is not closed: "
             f"its contact forces differ from the cycle before by {percent(max(closures))} of the "
-            "largest; compute more cycles there, and take the last"
+            "largest; compute more cycles there, and take the last",
         )
 
 
@@ -153,11 +163,12 @@ def warn_of_contact(
         linked = all(result.link.corrects for result in first)
         has = "resolves only as far as the mesh does" if linked else "neglects"
         reporter.warn(
+            WarningKind.DISSIMILAR_NEGLECTED,
             f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}), so shear moves the "
-            f"surfaces normally, which contact.method: normal {has}: use full"
+            f"surfaces normally, which contact.method: normal {has}: use full",
         )
-    for line in border_warnings(stages, first):
-        reporter.warn(line)
+    for notice in border_warnings(stages, first):
+        reporter.warn(*notice)
     for (stage, state), result in zip(faces, first, strict=True):
         terms = case.terms(stage.name)
         yield_stress = min(material.yield_stress for material in terms.materials)
@@ -166,17 +177,18 @@ def warn_of_contact(
         highest = result.pressure.max()
         if highest > yield_stress:
             reporter.warn(
+                WarningKind.PRESSURE_ABOVE_YIELD,
                 f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
-                f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
+                f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there",
             )
         if case.contact.method == "nodes":
             continue  # the grid only shows them
-        if warning := _energies_differ(source, stage, state.loads, result):
-            reporter.warn(f"{stage.name}: {warning}")
+        if reason := _energies_differ(source, stage, state.loads, result):
+            reporter.warn(WarningKind.ENERGIES_DIFFER, f"{stage.name}: {reason}")
         settings, pressure = case.contact_of(stage.name), result.pressure[source.peak]
         check_cells(stage.name, settings, stage.grid, pressure, reporter)
-        for line in structure_of(case).warnings(case, stage, float(state.loads.P[source.peak])):
-            reporter.warn(line)
+        for notice in structure_of(case).warnings(case, stage, float(state.loads.P[source.peak])):
+            reporter.warn(*notice)
 
 
 def _energies_differ(
@@ -223,8 +235,9 @@ def warn_of_instability(faces: WornFaces, cycles: float, reporter: Reporter) -> 
     stable = min(stage.contact.stable_cycles(state) for stage, state in faces)
     if cycles > stable:
         reporter.warn(
+            WarningKind.UNSTABLE_STEPS,
             f"explicit wear steps above {stable:.3g} cycles amplify the roughness of the grid: "
-            "use implicit or smaller steps (wear.step)"
+            "use implicit or smaller steps (wear.step)",
         )
 
 
@@ -233,7 +246,7 @@ def warn_of_growth(faces: WornFaces, reporter: Reporter) -> None:
     for stage, state in faces:
         worn = state.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
-            reporter.warn(stage.border_warning)
+            reporter.warn(*stage.border_warning)
 
 
 def warn_of_many_jumps(
@@ -243,9 +256,10 @@ def warn_of_many_jumps(
     key = next((key for key in SIZES if getattr(wear.step, key) is not None), None)
     longer = "wear.tolerance" if key is None else f"wear.step.{key}"
     reporter.warn(
+        WarningKind.MANY_STEPS,
         f"{state.jump} wear jumps have worn {state.cycles[-1]:.3g} of {wear.cycles:g} cycles, and "
         f"about {left} more are needed, each of which takes time and space in the results: a "
-        f"larger {longer} needs fewer"
+        f"larger {longer} needs fewer",
     )
 
 

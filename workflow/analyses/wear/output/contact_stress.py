@@ -14,6 +14,7 @@ from sa_solver.ties import first_largest
 from sa_solver.types import Array
 from workflow.analyses.wear.case.base import WearCase
 from workflow.case.text.readable import percent
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.stress.contact_stress import STUCK_SHARE, BodyStress, InterfaceStress
 from workflow.models.stress.layout import MOMENTS
 from workflow.shell.output.results import ResultsWriter
@@ -120,8 +121,8 @@ def report_stress(
             reporter.log(
                 f"{stress.name}: the stress under the contact is that of its tractions alone"
             )
-        elif stress.carried_warning:
-            reporter.warn(stress.carried_warning)
+        elif warning := stress.carried_warning:
+            reporter.warn(*warning)
 
 
 def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
@@ -130,11 +131,13 @@ def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
     worst = unknown.max(axis=0)
     if worst[peak] > STUCK_SHARE:
         reporter.warn(
+            WarningKind.UNKNOWN_SHEAR,
             f"up to {percent(worst[peak])} of the peak load sticks, so stress.section lacks its "
-            f"shear, and stress.life the stress of that increment: {why}"
+            f"shear, and stress.life the stress of that increment: {why}",
         )
     if count := int((worst > STUCK_SHARE).sum()):
         reporter.warn(
+            WarningKind.UNKNOWN_SHEAR,
             f"stress.life leaves out {count} of {len(worst)} increments, in which up to "
-            f"{percent(worst.max())} of the load sticks: {why}"
+            f"{percent(worst.max())} of the load sticks: {why}",
         )

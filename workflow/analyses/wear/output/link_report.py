@@ -6,6 +6,7 @@ from typing import Any
 
 from wear.contact.link import StructureLink
 from workflow.case.text.readable import percent
+from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -50,7 +51,8 @@ def report_link(name: str, link: StructureLink, line: bool, reporter: Reporter) 
             else "the deformation changes within fewer nodes than a fit can follow"
         )
         reporter.warn(
+            WarningKind.UNCERTAIN_LINK,
             f"{name}: the link to the structure has errors of {percent(misfit)} (smooth) and "
             f"{percent(graininess)} (grainy) of the deformation of half-spaces, and pressures may "
-            f"be wrong by as much: {why}; refine the mesh of the contact face"
+            f"be wrong by as much: {why}; refine the mesh of the contact face",
         )

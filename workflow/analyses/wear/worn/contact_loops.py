@@ -18,6 +18,7 @@ from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.output.loop_table import COLUMNS, OVER_ENERGY, SLIDES, write_loop_table
 from workflow.case.text.readable import percent
 from workflow.layout.declared import Arrays, declared
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.loops import WornLoop
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.output.results import ResultsWriter
@@ -87,8 +88,9 @@ def warn_of_border(loops: dict[str, dict[str, Any]], asked: Loops, reporter: Rep
         share = max(loop[when]["border_load"] for when in ("unworn", "worn"))
         if share > 0.0 and asked.normal_force is not None:
             reporter.warn(
+                WarningKind.CONTACT_AT_BORDER,
                 f"{name}: in the tangential loops the contact reaches the border of its grid, "
-                f"which carries {percent(share)} of the force: lower loops.normal_force"
+                f"which carries {percent(share)} of the force: lower loops.normal_force",
             )
 
 

@@ -14,6 +14,7 @@ from workflow.analyses.wear.worn.worn_nodes import (
     write_worn_nodes,
 )
 from workflow.case.text.readable import percent
+from workflow.messages.warning_kinds import WarningKind
 from workflow.models.contact import FaceContact, FaceState, WornFaces
 from workflow.models.loads import LoadSource, UserFace
 from workflow.shell.folders.folder import OutputFolder
@@ -37,9 +38,10 @@ def write_worn_faces(
             write_worn_nodes(path, face.numbers, displacement)
             if worn.volume_share < FULL_SHARE:
                 reporter.warn(
+                    WarningKind.WEAR_OFF_THE_NODES,
                     f"{stage.name}, body_{face.body}: the nodes carry only "
                     f"{percent(worn.volume_share)} of the worn volume, as the rest lies outside "
-                    "their face"
+                    "their face",
                 )
             summary.setdefault(stage.name, {})[f"body_{face.body}"] = {
                 "file": name,

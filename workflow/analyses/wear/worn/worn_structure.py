@@ -25,6 +25,7 @@ from workflow.analyses.wear.structures.resultants.writing import put_closure
 from workflow.analyses.wear.worn.bolts import BoltTensions
 from workflow.case.text.readable import percent
 from workflow.layout.declared import Arrays
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.budget.parts import ResultError
 from workflow.models.contact import WornFaces
 from workflow.models.stress.structure_stress import (
@@ -127,9 +128,11 @@ class WornStructure:
             worst = max(notches, key=lambda notch: notch.error, default=None)
             if worst is not None and worst.error > accuracy:
                 x, y, z = worst.place
+                kind, why = self._why(worst, accuracy)
                 reporter.warn(
+                    kind,
                     f"{body.name}: the largest stress on the free surface, {worst.von_mises:.0f} "
-                    f"MPa at X {x:.4g}, Y {y:.4g}, Z {z:.4g} mm, " + self._why(worst, accuracy)
+                    f"MPa at X {x:.4g}, Y {y:.4g}, Z {z:.4g} mm, {why}",
                 )
 
     @property
@@ -137,18 +140,20 @@ class WornStructure:
         """Stress fields of all bodies, unworn and worn."""
         return tuple(stress.fields for stress in self.stressed.stresses.values())
 
-    def _why(self, peak: PeakStress, accuracy: float) -> str:
+    def _why(self, peak: PeakStress, accuracy: float) -> Notice:
         """Return the reason why a stress is unreliable, and a remedy."""
         if not peak.bounded:
-            return (
+            return Notice(
+                WarningKind.UNBOUNDED_STRESS,
                 "has no limit as the mesh is refined, because it is next to a sharp inward "
                 "corner, a fillet of fewer than nine elements round the circle or the end of a "
                 "clamped or rigid face: round the corner, refine the fillet, or hold the body "
-                "farther away"
+                "farther away",
             )
-        return (
+        return Notice(
+            WarningKind.UNCERTAIN_NOTCH_STRESS,
             f"has an estimated error of {percent(peak.error)} due to the mesh, above the accuracy "
-            f"of {100 * accuracy:g} %: {self.stage.model.finer}"
+            f"of {100 * accuracy:g} %: {self.stage.model.finer}",
         )
 
     def _errors(self) -> dict[str, dict[str, ResultError]]:
@@ -270,7 +275,10 @@ def worn_structure(
         mesh = worn()
         written, folded = formed_meshes(stage.mesh, mesh)
         if folded:
-            reporter.warn(f"{folded}: worn.msh, points and ParaView files show only the worn shape")
+            reporter.warn(
+                WarningKind.WORN_MESH_SIMPLIFIED,
+                f"{folded}: worn.msh, points and ParaView files show only the worn shape",
+            )
         with replacing(
             folder.reserve("worn.msh", "the mesh with the worn faces, in mm")
         ) as unfinished:

@@ -48,6 +48,7 @@ from workflow.case.plausibility import heights, long_stroke
 from workflow.case.sections import GridCells, Length, LineCells, Section, Title, disagreement, entry
 from workflow.case.source import Source
 from workflow.case.text.plain import plain, shares
+from workflow.messages.warning_kinds import Notice
 from workflow.models.gaps import GapFunction
 from workflow.models.uncoupled.load_table import SHIFTS, LoadTable
 
@@ -301,7 +302,7 @@ class TwoBodiesWearCase(WearCase):
         along, across = self.size
         return along, 1.0 if self.line else across
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         yield from super().plausibility_warnings()
         yield from _warnings_about(self)
 
@@ -387,7 +388,7 @@ def _in_words(path: LoadPath | LineLoadPath, force: str) -> str:
     return f"{', '.join(path.ranges())} in {steps}"
 
 
-def _warnings_about(case: TwoBodiesWearCase) -> Iterator[str]:
+def _warnings_about(case: TwoBodiesWearCase) -> Iterator[Notice]:
     """Yield plausibility warnings about loads, stroke and heights of a file."""
     bodies = case.materials.body_1, case.materials.body_2
     table, simple = case.load_path.table(), isinstance(case.load_path, Stroke)

@@ -10,6 +10,7 @@ from workflow.analyses.wear.approximations.ladders import flank_mesh
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
 from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.messages.warning_kinds import Notice
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def _choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any] | None]:
     return choose_increments(case, section_joint)
 
 
-def _warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[str]:
+def _warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[Notice]:
     from workflow.analyses.wear.structures.dovetail.edge_peaks import warnings
 
     return warnings(case, stage, load)

@@ -26,6 +26,7 @@ from workflow.case.fields import AUTO, Auto, OrAuto, Quantity, Whole
 from workflow.case.plausibility import pressed
 from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry, together
 from workflow.case.text.plain import plain, shares
+from workflow.messages.warning_kinds import Notice, WarningKind
 
 if TYPE_CHECKING:
     from fe_models.geometry.dovetail import Dovetail as Geometry
@@ -419,7 +420,7 @@ class DovetailCase(FiniteElementCase):
     def face_sides(self) -> tuple[float, float]:
         return self.structure.face_width, self.structure.slot_length
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         yield from super().plausibility_warnings()
         width, length = self.face_sides()
         pressure = self._pull / (2.0 * width * length * cos(self.structure.flank_angle))
@@ -427,10 +428,11 @@ class DovetailCase(FiniteElementCase):
         # One of the flanks carries nothing if the pull acts outside of both.
         arm, moment = 0.5 * self.structure.neck_width, abs(self.load_path.aerodynamic_moment)
         if moment > arm * self._pull:
-            yield (
+            yield Notice(
+                WarningKind.FLANK_LIFTS,
                 f"load_path.aerodynamic_moment: {plain(moment, 'N*mm')} would lift the blade off "
                 f"a flank: it exceeds the pull of {plain(self._pull, 'N')} on half of the neck, "
-                f"{plain(arm, 'mm')}"
+                f"{plain(arm, 'mm')}",
             )
         yield from self.surface_warnings()
 

@@ -7,19 +7,21 @@ from collections.abc import Iterator
 from sa_solver.reference.flat_rounded import FlatRoundedPunch
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.case.text.readable import percent
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.contact import FaceContact
 
 # Share of the edge peak, from a closed form, that the grid may miss.
 PEAK_ERROR = 0.05
 
 
-def warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[str]:
+def warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[Notice]:
     """Yield a warning for each edge whose pressure peak the grid misses."""
     for edge, error in edge_peak_errors(case, stage, load).items():
         if abs(error) > PEAK_ERROR:
-            yield (
+            yield Notice(
+                WarningKind.EDGE_PEAK_MISSED,
                 f"{stage.name}: the grid misses {percent(abs(error))} of the pressure peak at the "
-                f"{edge}: refine contact.grid or increase structure.{edge}_radius"
+                f"{edge}: refine contact.grid or increase structure.{edge}_radius",
             )
 
 

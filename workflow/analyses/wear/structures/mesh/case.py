@@ -62,6 +62,7 @@ from workflow.case.changing import changed
 from workflow.case.fields import AUTO
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 from workflow.case.text.plain import body_text, counted, listed
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.faces import face_size
 
 if TYPE_CHECKING:
@@ -258,22 +259,26 @@ class MeshCase(FiniteElementCase):
             *(("load", load.text) for load in structure.loads),
         ]
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         """Yield plausibility warnings about file, lengths, elements and contacts."""
         yield from super().plausibility_warnings()
         imported = self.structure.read(self.mesh.size)
         if left := imported.unused:
-            yield (
+            yield Notice(
+                WarningKind.UNUSED_CONTENT,
                 f"structure.file: {counted(len(left), 'line')} with loads, supports, contacts or "
                 f"materials not used, the first is {left[0]}; fretscale describe lists all, and "
-                "--case writes them as a case"
+                "--case writes them as a case",
             )
+        for remark in imported.remarks:
+            yield Notice(WarningKind.READER_REMARK, f"structure.file: {remark}")
         yield from size_warnings(imported, self.solids, self.structure.loads)
         mesh = self.structure.mesh(self.mesh.size, self.mesh.order)
-        yield from (f"mesh.order: {warning}" for warning in folded_elements(mesh, imported))
+        for kind, text in folded_elements(mesh, imported):
+            yield Notice(kind, f"mesh.order: {text}")
         for index, interface in enumerate(mesh.interfaces):
-            for warning in filter(None, (hardly_met(mesh, interface), apart(mesh, interface))):
-                yield f"structure.contacts.{index}: {warning}"
+            for kind, text in filter(None, (hardly_met(mesh, interface), apart(mesh, interface))):
+                yield Notice(kind, f"structure.contacts.{index}: {text}")
         yield from self.surface_warnings()
 
     @model_validator(mode="after")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from workflow.case.text.plain import counted
+from workflow.messages.warning_kinds import Notice, WarningKind
 
 if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh
@@ -41,7 +42,7 @@ def elements_outline(mesh: StructureMesh, imported: ImportedMesh, order: int) ->
             )
 
 
-def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[str]:
+def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[Notice]:
     """Yield warnings about elements that midside nodes would fold, and how they are treated."""
     from fe_models.meshes.second_order import curvature
 
@@ -49,22 +50,24 @@ def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[str
         if body.midsides is None or not (found := curvature(body, imported)):
             continue
         if found.straightened:
-            yield (
+            yield Notice(
+                WarningKind.FOLDED_ELEMENTS,
                 f"{body.name}: midside nodes fold some elements, so "
                 f"{counted(found.straightened, 'edge')} of {found.edges} are taken as straight: "
-                "refine the mesh where it bends"
+                "refine the mesh where it bends",
             )
 
 
-def apart(mesh: StructureMesh, interface: Interface) -> str:
-    """Return a warning about matching faces whose midside nodes differ, or an empty string."""
+def apart(mesh: StructureMesh, interface: Interface) -> Notice | None:
+    """Return a warning about matching faces whose midside nodes differ, if they do."""
     from fe_models.meshes.second_order import distance_of_midsides
 
     between = distance_of_midsides(interface, [mesh.bodies[place] for place in interface.bodies])
     if between <= APART * float(interface.facet_sizes.max()) ** (1.0 if interface.line else 0.5):
-        return ""
-    return (
+        return None
+    return Notice(
+        WarningKind.MIDSIDES_APART,
         f"{interface.name}: its faces meet node to node, but their midside nodes are up to "
         f"{1e3 * between:.3g} µm apart; the gap there is taken as zero: give both faces the "
-        "same midside nodes, or take mesh.order: 1"
+        "same midside nodes, or take mesh.order: 1",
     )

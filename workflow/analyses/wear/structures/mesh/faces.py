@@ -12,6 +12,7 @@ from workflow.analyses.wear.case.scanned import MIRRORED
 from workflow.case.files.input_files import read_heights
 from workflow.case.sections import Section, disagreement
 from workflow.case.text.plain import counted, shape_in_words
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.faces import face_size, planes_of_symmetry
 
 # Relative rounding error of shared areas; and the least shared part of the smaller face, which may
@@ -79,15 +80,16 @@ def _curved(interface: Interface) -> str:
     return f", {' and '.join(parts)}" if parts else ""
 
 
-def hardly_met(mesh: StructureMesh, interface: Interface) -> str:
-    """Return a plausibility warning about faces that share little, or an empty string."""
+def hardly_met(mesh: StructureMesh, interface: Interface) -> Notice | None:
+    """Return a plausibility warning about faces that share little, if they do."""
     shared, *whole = _areas(mesh, interface)
     if shared >= WHOLE * min(whole):
-        return ""
-    return (
+        return None
+    return Notice(
+        WarningKind.FACES_HARDLY_MEET,
         f"{interface.name}: its faces share only {shared:.4g} {_unit(interface)} of "
         f"{whole[0]:.4g} and {whole[1]:.4g}: if a face has several parts, name them all, as in "
-        "face_2: [a, b]"
+        "face_2: [a, b]",
     )
 
 

@@ -23,6 +23,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
 from workflow.case.fields import File, Word
 from workflow.case.plausibility import WEAK, pressed
 from workflow.case.text.plain import plain
+from workflow.messages.warning_kinds import Notice, WarningKind
 
 if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh
@@ -56,19 +57,21 @@ def lengths_outline(imported: ImportedMesh, names: tuple[str, ...]) -> str:
 
 def size_warnings(
     imported: ImportedMesh, solids: Mapping[str, MeshMaterial], loads: Sequence[MeshLoad]
-) -> Iterator[str]:
+) -> Iterator[Notice]:
     """Yield plausibility warnings about sizes of bodies, by themselves and with the loads."""
     from fe_models.geometry.imported import GIVEN
 
     bodies = [imported.bodies[name] for name in solids]
     side = float(np.ptp(np.concatenate([body.points for body in bodies]), axis=0).max())
     if not USUAL[0] <= side <= USUAL[1]:
-        yield f"structure.length_unit: {_unusual(imported, side)}"
+        text = f"structure.length_unit: {_unusual(imported, side)}"
+        yield Notice(WarningKind.UNUSUAL_LENGTH, text)
     elif imported.unit.name == "m" and imported.unit.source != GIVEN:
-        yield (
+        yield Notice(
+            WarningKind.UNUSUAL_LENGTH,
             f"structure.length_unit: lengths are {imported.unit}, which gives bodies of "
             f"{plain(side, 'mm', 4)}; Salome and FreeCAD write this unit into every mesh: give mm "
-            "or m here"
+            "or m here",
         )
     yield from _loads(loads, imported, solids)
 
@@ -86,7 +89,7 @@ def _unusual(imported: ImportedMesh, side: float) -> str:
 
 def _loads(
     loads: Sequence[MeshLoad], imported: ImportedMesh, solids: Mapping[str, MeshMaterial]
-) -> Iterator[str]:
+) -> Iterator[Notice]:
     """Yield warnings about loads too large for the bodies, or all of them too small."""
     bodies = [imported.bodies[name] for name in solids]
     stresses: dict[str, float] = {}
@@ -105,15 +108,16 @@ def _loads(
 
 def _moved(
     key: str, load: DisplacementLoad, most: float, imported: ImportedMesh, bodies: list[Body]
-) -> Iterator[str]:
+) -> Iterator[Notice]:
     """Yield a warning about a face whose displacement is large compared with its body."""
     motion = most * float(np.linalg.norm(load.displacement))
     for body in bodies:
         side = float(np.ptp(body.points, axis=0).max())
         if _area(imported, body, load.group) and motion > MOVED * side:
-            yield (
+            yield Notice(
+                WarningKind.UNUSUAL_LOAD,
                 f"{key}.displacement: moves {body.name}, which is {plain(side, 'mm', 4)} long, by "
-                f"{plain(motion, 'mm', 4)}: are its unit and that of the mesh right?"
+                f"{plain(motion, 'mm', 4)}: are its unit and that of the mesh right?",
             )
 
 

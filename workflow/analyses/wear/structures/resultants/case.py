@@ -23,6 +23,7 @@ from workflow.case.files.input_files import InputFileError
 from workflow.case.plausibility import pressed, uneven_cells
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 from workflow.case.text.plain import between, plain, shape_in_words
+from workflow.messages.warning_kinds import Notice
 
 # Deviation of x and normal from a right angle that is accepted, for numbers with six digits.
 PERPENDICULAR = 1e-6
@@ -276,7 +277,7 @@ class ResultantsCase(WearCase):
         sides = f"{size[0]:g} mm" if self.structure.line else f"{size[0]:g} x {size[1]:g} mm"
         return f"{sides}, {unnamed if gap is None else shape_in_words(gap)}"
 
-    def plausibility_warnings(self) -> Iterator[str]:
+    def plausibility_warnings(self) -> Iterator[Notice]:
         yield from super().plausibility_warnings()
         for name, imported in self.loads().items():
             x, y = sides = self.structure.size_of(name)
