@@ -47,6 +47,8 @@ BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7",
 SKY, AMBER, YELLOW = "#56B4E9", "#E69F00", "#F0E442"
 # Greys of lines, of areas behind lines, and of the least important part of a figure.
 GREY, SHADE, PALE = "#999999", "#BBBBBB", "#E3E3E3"
+# Light blue and light orange, of areas that carry other marks.
+PALE_BLUE, PALE_ORANGE = "#9DC3DE", "#F2B48C"
 # Colours of fields and of ordered curves; the end of the map is too bright for lines.
 COLOUR_MAP, LAST_SHADE = "viridis", 0.9
 # Top of panels that begin at 0, relative to the largest value.
