@@ -6,19 +6,32 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from math import inf, isfinite, log10
 from pathlib import Path
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from matplotlib.transforms import Bbox
 
+from workflow.case.text.typeset import typeset
 from workflow.chart.ladder import ROUNDING, Ladder, Point
 from workflow.chart.run import Chart
 from workflow.pictures.panels import legend_below, new_figure
-from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, write_figures
+from workflow.pictures.style import (
+    AMBER,
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    YELLOW,
+    write_figures,
+)
 
-COSTS = {"seconds": "seconds, alone on this machine", "convolutions": "convolutions"}
-COLOURS = (BLUE, ORANGE, GREEN, PURPLE, "#E69F00", "#56B4E9", "#F0E442", BLACK, "#999999")
+COSTS = {"seconds": "computing time on this machine [s]", "convolutions": "convolutions"}
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, YELLOW, BLACK, GREY)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 HEIGHT = 6.6
 LEGEND_COLUMNS = 4
@@ -66,10 +79,9 @@ def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
 def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
     """Draw error against seconds and against convolutions, with a line for each branch."""
     chosen = ladder.cheapest(accuracy)
-    ending = (
-        "no rung is known to be sufficient" if chosen is None else f"{chosen.name} is sufficient"
-    )
-    title = f"{ladder.axis.name}: {ladder.axis.what}; for {100 * accuracy:g} % {ending}"
+    which = "none of these settings" if chosen is None else chosen.name
+    what = ladder.axis.what
+    title = f"{what[0].upper()}{what[1:]}: {which} suffices for {100 * accuracy:g} %"
     figure = new_figure(title, HEIGHT)
     bottom = _bottom([ladder])
     panels = _panels(figure, [ladder])
@@ -97,7 +109,7 @@ def all_figure(chart: Chart) -> Figure:
     """Draw the efficient rungs of all axes, each varied alone about the case's own settings."""
     ladders = [ladder for ladder in chart.ladders if ladder.rungs]
     lowest = max(_bottom(ladders), DEEPEST * chart.accuracy)
-    title = f"All axes, each varied alone; errors below {100 * lowest:.1g} % on the dotted line"
+    title = "Error against cost of each setting, varied alone"
     figure = new_figure(title, HEIGHT)
     for axis, cost in _panels(figure, ladders):
         for number, ladder in enumerate(ladders):
@@ -105,7 +117,7 @@ def all_figure(chart: Chart) -> Figure:
             _draw_line(axis, baseline, cost, lowest, number, None)
             _draw_line(axis, _frontier(ladder.rungs, cost), cost, lowest, number, ladder.axis.name)
             _draw_baseline(axis, ladder, cost, lowest)
-        axis.axhline(lowest, color=BLACK, lw=0.6, ls=":")
+        axis.axhline(lowest, color=BLACK, lw=0.6, ls=":", label="errors below the shown range")
         _finish(axis, cost, chart.accuracy, (lowest, _top(ladders, chart.accuracy)))
     _label(figure)
     return figure
@@ -202,17 +214,16 @@ def _draw_frontier(axis: Axes, rungs: Sequence[Point], cost: str, bottom: float)
     places = [_place(rung, cost, bottom) for rung in _frontier(rungs, cost)]
     if places:
         costs, errors = zip(*places, strict=True)
-        grey = "#88888859"
-        axis.step(costs, errors, where="post", label="efficient", color=grey, lw=5.0, zorder=1)
+        label = "smallest error for the cost"
+        look: dict[str, Any] = {"color": GREY, "alpha": 0.45, "lw": 5.0, "zorder": 1}
+        axis.step(costs, errors, where="post", label=label, **look)
 
 
 def _draw_floor(axis: Axes, ladder: Ladder) -> None:
     if ladder.floor > 0.0 and isfinite(ladder.floor):
         axis.axhspan(0.0, ladder.floor, color=ORANGE, alpha=0.12, lw=0, zorder=0)
         axis.axhline(ladder.floor, color=ORANGE, lw=0.8, alpha=0.6)
-        axis.plot(
-            [], [], "-", color=ORANGE, alpha=0.3, lw=8, label="reference not known more accurately"
-        )
+        axis.plot([], [], "-", color=ORANGE, alpha=0.3, lw=8, label="uncertainty of the reference")
 
 
 def _draw_quantities(axis: Axes, ladder: Ladder, cost: str) -> None:
@@ -225,25 +236,28 @@ def _draw_quantities(axis: Axes, ladder: Ladder, cost: str) -> None:
         seen = [place for place in places if place[1] > reference.floor]
         if seen:
             colour = COLOURS[number % len(COLOURS)]
-            axis.plot(*zip(*seen, strict=True), ":", color=colour, lw=1.6, zorder=2, label=quantity)
+            name = quantity.removeprefix("states.-1.").replace("_", " ")
+            axis.plot(*zip(*seen, strict=True), ":", color=colour, lw=1.6, zorder=2, label=name)
 
 
 def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -> None:
     """Set scales and labels; ``ends`` are the lowest and the highest error shown."""
-    axis.axhline(accuracy, color=BLACK, lw=1.0, ls="--", label=f"required: {100 * accuracy:g} %")
+    axis.axhline(
+        accuracy, color=BLACK, lw=1.0, ls="--", label=f"required accuracy: {100 * accuracy:g} %"
+    )
     axis.set(xlabel=COSTS[cost], xscale="log", yscale="log", ylim=(ends[0] / 1.6, ends[1]))
     low, high = axis.get_xlim()
     high *= (high / low) ** LAST_NAME
     axis.set_xlim(low, high)
     axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7) if high < 20 * low else (1, 3)))
-    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_major_formatter(lambda cost, _: typeset(f"{cost:g}"))
     axis.xaxis.set_minor_formatter("")
-    axis.yaxis.set_major_formatter(lambda share, _: f"{100 * share:g} %")
+    axis.yaxis.set_major_formatter(lambda share, _: typeset(f"{100 * share:g}"))
     axis.yaxis.set_minor_formatter("")
 
 
 def _label(figure: Figure) -> None:
-    figure.axes[0].set_ylabel("largest relative error of the quantities")
+    figure.axes[0].set_ylabel("largest relative error [%]")
     legend_below(figure, figure.axes[:1], columns=LEGEND_COLUMNS, fontsize=LEGEND_SIZE)
 
 

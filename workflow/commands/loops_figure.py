@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from sa_solver.types import Array, Indices
 from wear.joints.measured.loop_record import LoopBranch
 from wear.joints.measured.measured_loops import MeasuredLoops
-from workflow.pictures.panels import legend_below, new_figure
+from workflow.pictures.panels import legend_below, new_figure, rounded, whole_ticks
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, write_figures
 
@@ -36,10 +36,15 @@ def figure(loops: MeasuredLoops, name: str) -> Figure:
     _draw_loops(axis, loops)
     legend_below(left, [axis])
     panels = right.subplots(3, 1, sharex=True)
-    _draw_values(panels[0], PER_MICRON * loops.stick_stiffness, "kt [N/µm]", BLUE)
-    _draw_values(panels[1], *_friction(loops), ORANGE)
-    _draw_values(panels[2], loops.energy, "energy [mJ]", GREEN)
+    _draw_values(panels[0], PER_MICRON * loops.stick_stiffness, "stiffness kt [N/µm]", BLUE)
+    friction, symbol = _friction(loops)
+    _draw_values(
+        panels[1], friction, f"friction {symbol}".replace("friction force", "force"), ORANGE
+    )
+    _draw_values(panels[2], loops.energy, "energy per cycle [mJ]", GREEN)
     panels[2].set_xlabel("cycle of the record")
+    panels[2].set_xlim(0.5, len(loops.energy) + 0.5)
+    whole_ticks(panels[2].xaxis)
     return drawn
 
 
@@ -50,7 +55,7 @@ def _draw_loops(axis: Axes, loops: MeasuredLoops) -> None:
     last = int(loops.step[-1])
     for number in range(0, last + 1, -(-(last + 1) // MOST_STEPS)):
         _draw_step(axis, loops, np.flatnonzero(loops.step == number), number == 0)
-    axis.set(xlabel="displacement [µm]", ylabel="force [N]")
+    axis.set(xlabel="displacement [µm]", ylabel="tangential force [N]")
 
 
 def _draw_step(axis: Axes, loops: MeasuredLoops, members: Indices, labelled: bool) -> None:
@@ -62,10 +67,10 @@ def _draw_step(axis: Axes, loops: MeasuredLoops, members: Indices, labelled: boo
     axis.plot(*_curve(loops, *pair), color=BLACK, lw=1.2, label=label if labelled else None)
     for number, branch in enumerate(pair):
         reported = labelled and number == 0
-        _draw_stick(axis, loops, middle, branch, "stick slope kt" if reported else None)
+        _draw_stick(axis, loops, middle, branch, "slope kt while sticking" if reported else None)
         if loops.sliding[middle] > 0.0:
             # Small strokes that stick have no such line: the first one drawn has the label.
-            named = "sliding, slope kr"
+            named = "slope kr while sliding"
             new = named not in axis.get_legend_handles_labels()[1]
             _draw_sliding(axis, loops, middle, branch, named if new else None)
 
@@ -102,7 +107,7 @@ def _draw_sliding(
 
 
 def _friction(loops: MeasuredLoops) -> tuple[Array, str]:
-    """Return the friction in the record, and its label."""
+    """Return the friction in the record, and its symbol with its unit."""
     values = np.where(loops.sliding > 0.0, loops.friction_force, loops.force)
     known = not np.isnan(loops.normal_load).any()
     values = values / loops.normal_load if known else values
@@ -121,11 +126,11 @@ def _draw_values(axis: Axes, values: Array, label: str, colour: str) -> None:
 
 def _title(loops: MeasuredLoops, name: str) -> str:
     if (steps := int(loops.step[-1]) + 1) > 1:
-        return f"{name}: {len(loops.energy)} loops in {steps} steps of similar ones"
+        return f"{name}: {len(loops.energy)} loops in {steps} steps of similar strokes"
     values, label = _friction(loops)
     stick = PER_MICRON * loops.stick_estimate.value
     called, _, unit = label.partition(" [")
     unit = f" {unit.rstrip(']')}" if unit else ""
     equals = " " if called.endswith("least") else " = "
-    known = f"kt = {stick:.4g} N/µm, " if np.isfinite(stick) else ""
-    return f"{name}: {known}{called}{equals}{values.mean():.4g}{unit}"
+    known = f"kt = {rounded(stick)} N/µm, " if np.isfinite(stick) else ""
+    return f"{name}: {known}{called}{equals}{rounded(float(values.mean()))}{unit}"

@@ -9,12 +9,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.case.text.typeset import minus
 from workflow.comparing.compared import ComparedRuns
+from workflow.pictures.panels import grouped_ticks, legend_below, new_figure
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
 from workflow.shell.output.curves import Curve, axis_labels, curves_of_run, largest, suited_units
 
-INCHES = 7.0, 4.6
+HEIGHT = 6.0  # [inches]
+# Curves with no more points than this have marks, as points that coincide make no line.
+FEW_POINTS = 8
 COLOURS = BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK
 STYLES = "-", "--", "-.", ":"
 # Ratio of the ranges of curves above which a logarithmic axis shows them.
@@ -48,7 +50,7 @@ def _alike(curves: dict[str, Curve]) -> dict[str, Curve]:
 
 
 def _draw(title: str, curves: dict[str, Curve]) -> Figure:
-    figure = Figure(figsize=INCHES, layout="constrained")
+    figure = new_figure(f"{title[:1].upper()}{title[1:]}, {len(curves)} runs", HEIGHT)
     axis = figure.subplots()
     first = next(iter(curves.values()))
     (x_unit, x_size), (y_unit, y_size) = suited_units(curves.values())
@@ -61,6 +63,7 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
             look,
             color=COLOURS[number % len(COLOURS)],
             label=name,
+            marker="o" if len(curve.x) <= FEW_POINTS else None,
         )
     if _much_smaller([curve.x for curve in curves.values()]):
         axis.set_xscale("log", nonpositive="mask")
@@ -68,9 +71,9 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
         axis.set_yscale("log", nonpositive="mask")
     for line in (axis.xaxis, axis.yaxis):
         if line.get_scale() == "linear":
-            line.set_major_formatter(lambda number, _: minus(f"{number:,.6g}"))
-    axis.set(title=title, **axis_labels(first, x_unit, y_unit))
-    axis.legend()
+            grouped_ticks(line)
+    axis.set(**axis_labels(first, x_unit, y_unit))
+    legend_below(figure, [axis], columns=3)
     return figure
 
 

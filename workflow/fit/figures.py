@@ -99,7 +99,7 @@ def _draw_residuals(axis: Axes, series: FittedSeries, residuals: Array) -> None:
         axis.axhline(level, color=BLACK, lw=0.8, ls="-" if level == 0.0 else "--")
     most = max(LEAST, 1.1 * float(np.abs(residuals).max()))
     axis.set_ylim(-most, most)
-    axis.set_ylabel("residual [deviations]")
+    axis.set_ylabel("residual [standard deviations]")
 
 
 def _label(axis: Axes, series: FittedSeries) -> None:

@@ -83,14 +83,15 @@ def _legends(figure: Figure) -> Iterator[tuple[Legend, float]]:
 
 
 def broken(words: str, letters: int) -> str:
-    """Break a text into lines of at most ``letters`` letters, after spaces, or names after ``_``.
+    """Break a text into lines of at most ``letters`` letters, after spaces.
 
-    A part that is still too long is broken anywhere.
+    A word longer than a line is broken after ``_`` and ``/``, and its parts, where they are still
+    too long, anywhere.
     """
     lines = []
     for paragraph in words.split("\n"):
         line = ""
-        for piece in re.split(r"(?<=[\s_/])", paragraph):
+        for piece in _pieces(paragraph, letters):
             if line and len(line) + len(piece.rstrip()) > letters:
                 lines.append(line)
                 line = ""
@@ -100,6 +101,12 @@ def broken(words: str, letters: int) -> str:
             line += piece
         lines.append(line)
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _pieces(paragraph: str, letters: int) -> Iterator[str]:
+    """Yield words with the spaces after them, and parts of words that are longer than a line."""
+    for word in re.split(r"(?<=\s)", paragraph):
+        yield from [word] if len(word.rstrip()) <= letters else re.split(r"(?<=[_/])", word)
 
 
 def _narrow(legend: Legend, room: float) -> bool:

@@ -15,9 +15,10 @@ from matplotlib.lines import Line2D
 
 from sa_solver.types import Array
 from workflow.case.sections import Measured
-from workflow.case.text.readable import everyday_unit, suited
+from workflow.case.text.readable import everyday_unit, percent, suited
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
+from workflow.pictures.panels import grouped_ticks, new_figure
 from workflow.pictures.style import AMBER, BLACK, BLUE, ORANGE
 from workflow.shell.analysis import Pictures
 from workflow.shell.output.curves import axis_labels, largest
@@ -27,7 +28,7 @@ from workflow.shell.output.tables import heading
 
 # Name of the figure with all measured points.
 MEASURED = "measured"
-WIDE, HIGH = 12.0, 4.2  # of a row [inches]
+HIGH, REST = 4.2, 0.5  # of a row of panels, and of the title [inches]
 # Pattern of the unit in the label of an axis.
 IN_BRACKETS = re.compile(r".*\[(.*?)\]", re.DOTALL)
 # A line of a figure is taken for a curve if they agree to this share of its extent: drawn numbers
@@ -143,15 +144,22 @@ def _draw_points(
 def _draw_all(measured: Sequence[Measured], curves: Sequence[CurvesOf], file: h5py.File) -> Figure:
     """Draw each curve with its points, next to their deviations."""
     rows = list(_found(measured, curves, file))
-    figure = Figure(figsize=(WIDE, HIGH * max(len(rows), 1)), layout="constrained")
-    panels = figure.subplots(max(len(rows), 1), 2, squeeze=False)
-    for (left, right), found in zip(panels, rows, strict=False):
-        _draw_beside(left, right, found)
     if not rows:
-        for axis in panels[0]:
-            axis.set_axis_off()
-        panels[0, 0].set_title("No measured points can be compared: see the warnings")
+        return new_figure("No measured points can be compared; the warnings say why", REST)
+    largest_share = max(float(np.abs(_deviations(found)).max()) for found in rows)
+    title = (
+        f"Computed curves deviate by up to {percent(largest_share)} of the largest measured value"
+    )
+    figure = new_figure(title, REST + HIGH * len(rows))
+    panels = figure.subplots(len(rows), 2, squeeze=False)
+    for (left, right), found in zip(panels, rows, strict=True):
+        _draw_beside(left, right, found)
     return figure
+
+
+def _deviations(found: MeasuredCurve) -> Array:
+    """Return the deviations from the points, as shares of the largest measured value."""
+    return (found.computed - found.points.y) / largest(found.points.y)
 
 
 def _draw_beside(left: Axes, right: Axes, found: MeasuredCurve) -> None:
@@ -171,3 +179,5 @@ def _draw_beside(left: Axes, right: Axes, found: MeasuredCurve) -> None:
     right.set(title="Computed minus measured", xlabel=left.get_xlabel())
     right.set_ylabel(heading("deviation", y_name))
     right.set_xlim(left.get_xlim())
+    for axis in (left, right):
+        grouped_ticks(axis.yaxis)

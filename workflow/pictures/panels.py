@@ -16,6 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
+from workflow.case.text.plain import GROUPED, times
+from workflow.case.text.readable import percent
 from workflow.case.text.typeset import typeset
 from workflow.pictures.fitting import FittedLayout
 from workflow.pictures.style import COLOUR_MAP, LAST_SHADE
@@ -35,6 +37,8 @@ TICKS = (2.0, 5.0)
 MANY_DECADES, FEW_DECADES, FEW_TICKS = 100.0, 4.0, 5
 # A change is given in percent if the first value is at least this share of the last.
 NEARLY_ZERO = 1e-2
+# Values from the first size on are shown as whole numbers, up to the second size.
+WHOLE_FROM, WHOLE_TO = 1e3, 1e7
 # Forces are shown in kN from this value on [N], volumes in µm³ up to this value [mm³].
 LARGE_FORCE, SMALL_VOLUME = 1e3, 1e-3
 
@@ -99,21 +103,37 @@ def shaded(items: Sequence[Any], most: int) -> list[tuple[Any, Any]]:
     return list(zip(chosen, shades, strict=True))
 
 
-def changes(values: Mapping[str, Iterable[float]], digits: str, unit: str = "") -> str:
-    """Describe the change of each named value for a title; of many names, the largest change."""
-    if len(values) > MOST_COLUMNS:
-        values = {name: tuple(series) for name, series in values.items()}
-        name = max(values, key=lambda name: max(values[name]))
-        return f"most on {changes({name: values[name]}, digits, unit)}"
-    steps = {name: " → ".join(format(v, digits) for v in series) for name, series in values.items()}
-    return ", ".join(f"{name} {text}{unit}" for name, text in steps.items())
+def rounded(value: float, digits: int = 3) -> str:
+    """Return a value with a few digits for a title or a legend: 0.379, 321, 16,800."""
+    near = float(f"{value:.{digits}g}")
+    return times(near) if WHOLE_FROM <= abs(near) < WHOLE_TO else f"{near:.{digits}g}"
+
+
+def course(series: Sequence[float], unit: str, digits: int = 3) -> str:
+    """Say in a title how a value changes from the first to the last: falls from 367 to 321 MPa."""
+    first, last = (rounded(series[place], digits) for place in (0, -1))
+    if len(series) == 1:
+        return f"is {last} {unit}"
+    if series[0] == 0.0:
+        return f"reaches {last} {unit}"
+    if first == last:
+        return f"stays at {last} {unit}"
+    return f"{'rises' if series[-1] > series[0] else 'falls'} from {first} to {last} {unit}"
+
+
+def largest_course(values: Mapping[str, Sequence[float]], unit: str) -> str:
+    """Say how the largest of some values changes, with its name if others change otherwise."""
+    texts = {name: course(series, unit) for name, series in values.items()}
+    name = max(values, key=lambda name: max(values[name]))
+    return texts[name] if len(set(texts.values())) == 1 else f"{texts[name]} ({name})"
 
 
 def change(before: float, after: float, unit: str) -> str:
     """Describe a relative change for a title, or give both values if the first is nearly zero."""
     if before > NEARLY_ZERO * abs(after):
-        return f"{after / before - 1.0:+.1%}"
-    return f"{before:.3g} → {after:.3g} {unit}"
+        share = after / before - 1.0
+        return f"{'+' if share > 0.0 else '-' if share < 0.0 else ''}{percent(abs(share))}"
+    return f"{rounded(before)} → {rounded(after)} {unit}"
 
 
 def force_unit(largest: float) -> tuple[float, str]:
@@ -194,6 +214,17 @@ def plain_ticks(line: Axis) -> None:
         line.set_major_locator(MaxNLocator(FEW_TICKS))
         line.set_minor_locator(NullLocator())
     line.set_major_formatter(lambda x, _: typeset(f"{x:g}"))
+
+
+def grouped_ticks(line: Axis) -> None:
+    """Set a few numbers along an axis that may be long, grouped by thousands if it is."""
+
+    def text(x: float, _: float) -> str:
+        grouped = "," if np.abs(line.get_view_interval()).max() >= GROUPED else ""
+        return typeset(f"{x:{grouped}.10g}")
+
+    line.set_major_locator(MaxNLocator(FEW_TICKS))
+    line.set_major_formatter(text)
 
 
 def whole_ticks(line: Axis) -> None:

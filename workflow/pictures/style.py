@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -43,12 +44,19 @@ STYLE: dict[Any, Any] = {
 }
 # Okabe and Ito's colours, which colour-blind readers distinguish too.
 BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
-SKY, AMBER = "#56B4E9", "#E69F00"
+SKY, AMBER, YELLOW = "#56B4E9", "#E69F00", "#F0E442"
+# Greys of lines, of areas behind lines, and of the least important part of a figure.
+GREY, SHADE, PALE = "#999999", "#BBBBBB", "#E3E3E3"
+# Light blue and light orange, of areas that carry other marks.
+PALE_BLUE, PALE_ORANGE = "#9DC3DE", "#F2B48C"
 # Colours of fields and of ordered curves; the end of the map is too bright for lines.
 COLOUR_MAP, LAST_SHADE = "viridis", 0.9
 # Top of panels that begin at 0, relative to the largest value.
 HEADROOM = 1.1
 
+
+# A product of two numbers, as in the size of a grid.
+TIMES = re.compile(r"(?<=\d) x (?=\d)")
 
 # Metadata that would contain the time of writing.
 UNDATED: dict[str, dict[str, Any]] = {
@@ -104,9 +112,9 @@ def _lay_out(figure: Figure) -> None:
     show.
     """
     for text in _words(figure):
-        text.set_text(typeset(text.get_text()))
+        text.set_text(TIMES.sub(" × ", typeset(text.get_text())))
     for text in _names_in_legends(figure):
-        text.set_text(minus(text.get_text()))
+        text.set_text(TIMES.sub(" × ", minus(text.get_text())))
     engine = figure.get_layout_engine()
     if engine is not None:
         figure.set_dpi(DOTS_PER_INCH)

@@ -16,11 +16,14 @@ from matplotlib.figure import Figure
 from sa_solver.types import Array
 from workflow.pictures.panels import (
     blocks,
+    grouped_ticks,
     label_rows,
     legend_below,
     new_figure,
     panel_rows,
     plain_ticks,
+    rounded,
+    volume_unit,
 )
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
@@ -32,12 +35,8 @@ LINES = 30
 LOGARITHMIC = 30.0
 # Fewest runs for which a rank correlation is meaningful.
 FEWEST_TO_CORRELATE = 6
-# Quantities to show, with labels: for wear runs with scale and unit ("" for the unit of the table);
-# for other runs the first of OTHERS that they have.
-WEAR = (
-    ("depth", "largest depths, both bodies", TO_MICRONS, "µm"),
-    ("volume", "volume, both bodies", 1.0, ""),
-)
+# Quantities of wear runs to show, with labels; other runs show the first of OTHERS that they have.
+WEAR = {"depth": "largest depth, both bodies", "volume": "worn volume, both bodies"}
 OTHERS = (
     ("states.-1.peak_pressure", "peak pressure at the end", "MPa"),
     ("loop.energy", "energy of the last closed cycle", "N mm"),
@@ -72,21 +71,21 @@ def _wearing(rows: Sequence[SweepRow]) -> list[str]:
 def kinetics_bands(title: str, rows: Sequence[SweepRow], names: Sequence[str]) -> Figure:
     """Draw depth and volume of all runs against cycles, by interface."""
     done = [row.finished.summary for row in rows if row.finished.summary]
-    statistics = "median (least to largest) at their end"
+    statistics = "medians (and ranges) at the end"
     figure = new_figure(f"{title}: {len(done)} runs, {statistics}", 9.0 * blocks(len(names)))
     axes = panel_rows(figure, 2, len(names))
-    units = [shown or _unit(f"{names[0]}.{quantity}", rows) for quantity, _, _, shown in WEAR]
+    scales = _scales(rows, names)
     for column, name in zip(axes.T, names, strict=True):
         summaries = [summary for summary in done if name in interfaces_of(summary)]
-        for axis, (quantity, _, scale, _), unit in zip(column, WEAR, units, strict=True):
+        for axis, quantity in zip(column, WEAR, strict=True):
+            scale, unit = scales[quantity]
             last = _draw_bands(axis, summaries, name, quantity, scale)
             low, middle, high = (float(np.quantile(last, q)) for q in (0.0, 0.5, 1.0))
-            values = f"{quantity} {middle:.3g} ({low:.3g} to {high:.3g})"
+            values = f"{quantity} {rounded(middle)} ({rounded(low)} to {rounded(high)})"
             axis.set_title(f"{name}: {values} {unit}")
         column[-1].set_xlabel("cycles")
-        column[-1].xaxis.set_major_formatter("{x:,.0f}")
-        column[-1].locator_params(axis="x", nbins=5)
-    label_rows(axes, [f"{what[1]} [{unit}]" for what, unit in zip(WEAR, units, strict=True)])
+        grouped_ticks(column[-1].xaxis)
+    label_rows(axes, [f"{label} [{scales[quantity][1]}]" for quantity, label in WEAR.items()])
     legend_below(figure, [axes[0, 0]])
     return figure
 
@@ -141,16 +140,17 @@ def _panels(rows: Sequence[SweepRow], names: Sequence[str]) -> list[list[Panel]]
     """Return panels by row and column of a figure, for the wearing interfaces ``names`` if any."""
     columns = columns_of(rows)
     if names:
+        scales = _scales(rows, names)
         return [
             [
                 Panel(
-                    f"{words} [{unit or _unit(f'{name}.{quantity}', rows)}]",
+                    f"{words} [{scales[quantity][1]}]",
                     f"{name}: {quantity} at the end",
-                    scale * columns[f"{name}.{quantity}"],
+                    scales[quantity][0] * columns[f"{name}.{quantity}"],
                 )
                 for name in names
             ]
-            for quantity, words, scale, unit in WEAR
+            for quantity, words in WEAR.items()
         ]
     shown = [quantity for quantity in OTHERS if quantity[0] in columns][:MOST_ROWS]
     per = "/mm" if LINE_CONTACT in columns else ""
@@ -160,15 +160,19 @@ def _panels(rows: Sequence[SweepRow], names: Sequence[str]) -> list[list[Panel]]
     ]
 
 
-def _unit(name: str, rows: Sequence[SweepRow]) -> str:
-    """Return the unit of a column, for an axis."""
-    return unit_of(name, rows).replace("^3", "³")
+def _scales(rows: Sequence[SweepRow], names: Sequence[str]) -> dict[str, tuple[float, str]]:
+    """Return scale and unit of the worn depths and volumes of all interfaces."""
+    columns = columns_of(rows)
+    volumes = np.concatenate([columns[f"{name}.volume"] for name in names])
+    scale, unit = volume_unit(float(np.nanmax(volumes)))
+    per = unit_of(f"{names[0]}.volume", rows).replace("^3", "³").removeprefix("mm³")
+    return {"depth": (TO_MICRONS, "µm"), "volume": (scale, f"{unit}{per}")}
 
 
 def against(title: str, varied: Varied, panels: list[list[Panel]]) -> Figure:
     """Draw results of the runs against one varied entry."""
     rows, columns = len(panels), len(panels[0])
-    figure = new_figure(f"{title}: against {varied.path}", 4.5 * rows * blocks(columns))
+    figure = new_figure(f"{title}: results against {varied.path}", 4.5 * rows * blocks(columns))
     axes = panel_rows(figure, rows, columns)
     places, ticks = _places(varied)
     for axis, panel in zip(axes.flat, (panel for row in panels for panel in row), strict=True):

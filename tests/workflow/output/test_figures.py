@@ -49,7 +49,7 @@ def test_profiles_show_the_pressure_in_the_middle(results: Path) -> None:
         figure = figures.pressure_profiles(file, CONTENTS)
         lines = {line.get_label(): line for line in figure.axes[0].lines}
         middle = file["contact/extrados/00000/pressure"][()][:, 20]
-    np.testing.assert_array_equal(lines["half-space 24 x 40, unworn"].get_ydata(), middle)
+    np.testing.assert_array_equal(lines["half-space 24 x 40 cells, unworn"].get_ydata(), middle)
 
 
 def test_kinetics_are_extrapolated_at_their_rate(results: Path) -> None:

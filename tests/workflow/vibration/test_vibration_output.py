@@ -37,7 +37,7 @@ BACKBONE = {
 CONTENTS = VibrationContents(
     ("00000", "00001"), ("00000", "00001"), places=True, backbone=True, joints=ROWS**2
 )
-NAMES = {"frequency_response", "resonance", "loops", "node_shares", "node_states", "pad_states"}
+NAMES = {"frequency_response", "resonance", "loops", "node_shares", "pad_states"}
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,12 @@ from sa_solver.types import Array
 from workflow.pictures.fields import centres, middle, near_middle
 from workflow.pictures.panels import (
     Figures,
+    course,
     legend_below,
     new_figure,
     panel_grid,
     plain_ticks,
+    rounded,
     spread,
 )
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
@@ -56,16 +58,18 @@ def pad(file: h5py.File) -> Figure:
     """Draw pressure and slip path on the pad under the first force: unworn, between, worn."""
     load = _loads(file)[0]
     states = _three(load)
-    figure = new_figure(f"The pad at {_force(load)}: {_pad_title(states)}", 7.2, compress=True)
+    peaks = [float(state["pressure"][()].max()) for state in states]
+    title = f"The largest pressure on the pad under {_force(load)} {course(peaks, 'MPa')}"
+    figure = new_figure(title, 7.2, compress=True)
     rows = figure.subplots(2, 3, sharex=True, sharey=True)
     for column, state in enumerate(states):
         top, bottom = rows[:, column]
         pressure, slip = state["pressure"][()], TO_MICRONS * state["cycle_slip"][()]
         cycles = f"{state.attrs['cycles']:,.0f} cycles" if column else "unworn"
-        _draw_pad(figure, top, file, pressure, "MPa")
-        _draw_pad(figure, bottom, file, slip, "µm")
-        top.set_title(f"pressure, {cycles}")
-        bottom.set(title="path of slip per cycle", xlabel="x [mm]")
+        _draw_pad(figure, top, file, pressure, "pressure [MPa]")
+        _draw_pad(figure, bottom, file, slip, "slip path per cycle [µm]")
+        top.set_title(cycles)
+        bottom.set_xlabel("x [mm]")
     for axis in rows[:, 0]:
         axis.set_ylabel("y [mm]")
     return figure
@@ -79,12 +83,7 @@ def _three(load: h5py.Group) -> list[h5py.Group]:
     return [states[0], states[int(np.abs(peaks - half).argmin())], states[-1]]
 
 
-def _pad_title(states: list[h5py.Group]) -> str:
-    first, last = (float(states[place]["pressure"][()].max()) for place in (0, -1))
-    return f"pressure at most {first:.4g} MPa, worn {last:.4g} MPa"
-
-
-def _draw_pad(figure: Figure, axis: Axes, file: h5py.File, field: Array, unit: str) -> None:
+def _draw_pad(figure: Figure, axis: Axes, file: h5py.File, field: Array, label: str) -> None:
     """Draw a nodal field over the pad's triangles, on its own scale; white where it is 0."""
     place, triangles = file["specimens/pad/coordinates"][()], file["specimens/pad/facets"][()]
     shown = triangles[np.any(field[triangles] > 0.0, axis=1)]
@@ -101,7 +100,7 @@ def _draw_pad(figure: Figure, axis: Axes, file: h5py.File, field: Array, unit: s
         cmap=COLOUR_MAP,
         vmin=0.0,
     )
-    figure.colorbar(image, ax=axis, label=f"[{unit}]", shrink=0.62)
+    figure.colorbar(image, ax=axis, label=label, pad=0.01)
 
 
 # --- loops --------------------------------------------------------------------------------------
@@ -118,9 +117,13 @@ def loops(file: h5py.File) -> Figure:
         ends = zip((states[0], states[-1]), (BLUE, ORANGE), SHAPES, strict=True)
         for state, colour, shape in ends:
             axis.plot(*_loop(state["loop"]), color=colour, label=f"{shape}, by Masing's rule")
-        look: dict[str, Any] = {"markersize": 4, "label": "unworn, coupled and marched"}
+        look: dict[str, Any] = {
+            "markersize": 4,
+            "label": "unworn, coupled and computed step by step",
+        }
         axis.plot(*_loop(load["coupled_cycle"]), ".", color=BLACK, **look)
-        axis.set(title=_force(load), xlabel="motion of the ring [µm]", ylabel="force [N]")
+        axis.set(title=_force(load), xlabel="displacement of the ring [µm]")
+        axis.set_ylabel("tangential force [N]")
     legend_below(figure, panels[:1])
     return figure
 
@@ -135,12 +138,14 @@ def _loops_title(loads: list[h5py.Group]) -> str:
         _range([PER_MICRON * float(kept[place]["secant_stiffness"][()]) for kept in states])
         for place in (0, -1)
     )
-    return f"Slope to half the largest force: unworn {unworn}, worn {worn} N/µm"
+    return (
+        f"Loops rise with {unworn} N/µm unworn and {worn} N/µm worn, up to half the largest force"
+    )
 
 
 def _range(values: list[float]) -> str:
     """Return the smallest and largest value in three digits, once where they are the same."""
-    low, high = (f"{value:.3g}" for value in (min(values), max(values)))
+    low, high = (rounded(value) for value in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
 
 
@@ -175,7 +180,7 @@ def kinetics(file: h5py.File) -> Figure:
 def _kinetics_title(loads: list[h5py.Group]) -> str:
     stuck = [load["kinetics/stick_stiffness"][()] for load in loads]
     unworn, worn = (_range([PER_MICRON * float(k[place]) for k in stuck]) for place in (0, -1))
-    return f"Stiffness of the stuck pair: unworn {unworn}, worn {worn} N/µm"
+    return f"The stiffness of the stuck pair is {unworn} N/µm unworn and {worn} N/µm worn"
 
 
 def _label_kinetics(panels: Any) -> None:
@@ -183,14 +188,14 @@ def _label_kinetics(panels: Any) -> None:
     for axis in panels.ravel():
         axis.set(xscale="log", xlabel="cycles")
         plain_ticks(axis.xaxis)
-    over_energy.set_xlabel("energy dissipated so far [J]")
-    over_cycles.set_title("stiffness: all stuck (lines), slope of the loop (dots)")
+    over_energy.set_xlabel("dissipated energy [J]")
+    over_cycles.set_title("stuck contact (lines), slope of the loop (dots)")
     over_energy.set_title("the same over the energy")
     for axis in (over_cycles, over_energy):
         axis.set_ylabel("tangential stiffness [N/µm]")
-    areas.set(title="area in contact", ylabel="area [mm²]", ylim=(0.0, None))
+    areas.set(title="contact area", ylabel="contact area [mm²]", ylim=(0.0, None))
     pressures.set(title="unevenness of the pressure", ylim=(0.0, None))
-    pressures.set_ylabel("rms of p/mean - 1 [%]")
+    pressures.set_ylabel("rms deviation from its mean [%]")
 
 
 # --- the half-space -----------------------------------------------------------------------------
@@ -200,18 +205,30 @@ def half_space(file: h5py.File) -> Figure:
     """Draw pressure and shear along x through the pad's middle, reduced model and half-space."""
     load = _loads(file)[0]
     states = _states(load)
-    figure = new_figure(f"Reduced specimens and half-space at {_force(load)}", 8.0)
+    figure = new_figure(_half_space_title(load), 8.0)
     rows = figure.subplots(2, 2, sharex=True)
     for column, (state, shape) in enumerate(zip((states[0], states[-1]), SHAPES, strict=True)):
         beside = load["half_space"][shape]
         for axis, name in zip(rows[:, column], ("pressure", "shear_x"), strict=True):
             _draw_profile(axis, file, state, beside, name)
         rows[0, column].set_title(f"{shape}: pressure at y = 0")
-        rows[1, column].set(title=f"{shape}: shear along x against the motion", xlabel="x [mm]")
+        rows[1, column].set(title=f"{shape}: shear at y = 0", xlabel="x [mm]")
     rows[0, 0].set_ylabel("pressure [MPa]")
-    rows[1, 0].set_ylabel("shear [MPa]")
+    rows[1, 0].set_ylabel("shear along x [MPa]")
     legend_below(figure, [rows[0, 0]])
     return figure
+
+
+def _half_space_title(load: h5py.Group) -> str:
+    """Return the title: the largest pressure of both models, unworn."""
+    model, half_space = (
+        rounded(float(group["pressure"][()].max()))
+        for group in (_states(load)[0], load["half_space"][SHAPES[0]])
+    )
+    return (
+        f"Unworn peak pressure under {_force(load)}: half-space {half_space} MPa, "
+        f"reduced model {model} MPa"
+    )
 
 
 def _draw_profile(

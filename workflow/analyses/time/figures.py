@@ -11,13 +11,17 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from workflow.analyses.time.outcome import MotionContents
+from workflow.case.text.plain import times
 from workflow.pictures.panels import (
     Figures,
+    course,
+    grouped_ticks,
     legend_below,
     new_figure,
     panel_grid,
     plain_ticks,
     present,
+    rounded,
     shaded,
     widen,
 )
@@ -30,7 +34,7 @@ MOST_CURVES = 6
 TO_METRES = 1e-3
 # Parameters: colour, factor from the unit of the file to that shown, and label.
 SHOWN = {
-    "friction": (BLUE, 1.0, "coefficient of friction µ [1]"),
+    "friction": (BLUE, 1.0, "coefficient of friction µ"),
     "stiffness": (ORANGE, PER_MICRON, "stiffness kt [N/µm]"),
     "residual_stiffness": (PURPLE, PER_MICRON, "residual stiffness [N/µm]"),
     "normal_load": (GREEN, 1.0, "normal load [N]"),
@@ -46,8 +50,6 @@ LAW_NAMES = {
 FIRST_MODE = 2.0
 # Motions are shown until they have decayed to this share of their largest value.
 FADED = 0.02
-# Energies from this value on are shown without decimals [J].
-LARGE_ENERGY = 1e3
 # Most points of a time history that a picture can resolve.
 MOST_POINTS = 20_000
 
@@ -79,8 +81,7 @@ def _states(
 
 def _label(state: h5py.Group, aged: bool) -> str:
     energy = TO_JOULES * float(state.attrs["energy"])
-    words = f"{energy:,.0f}" if energy >= LARGE_ENERGY else f"{energy:.4g}"
-    text = f"{words} J" if energy else "unworn"
+    text = f"{rounded(energy, 4)} J" if energy else "unworn"
     if aged and state.attrs["cycles"]:
         text += f", {state.attrs['cycles']:,.0f} cycles"
     return text
@@ -98,15 +99,15 @@ def loops(file: h5py.File, contents: MotionContents) -> Figure:
         displacement, force = TO_MICRONS * loop["displacement"][()], loop["force"][()]
         axis.plot(displacement, force, color=colour, label=label)
     axis.set(xlabel="displacement of the joint [µm]", ylabel="force of the joint [N]")
-    axis.set_title(f"{LAW_NAMES[file.attrs['law']]}: steady cycles after so much energy")
-    legend_below(figure, [axis], columns=3, title="dissipated so far")
+    axis.set_title(f"{LAW_NAMES[file.attrs['law']]} joint: steady cycles")
+    legend_below(figure, [axis], columns=3, title="energy dissipated before")
     return figure
 
 
 def _loops_title(energies: list[float]) -> str:
     if len(energies) == 1:
-        return f"A cycle dissipates {energies[0]:.3g} mJ"
-    return f"Energy of a cycle: {energies[0]:.3g} mJ at first, {energies[-1]:.3g} mJ in the end"
+        return f"A cycle dissipates {rounded(energies[0])} mJ"
+    return f"The energy dissipated in a cycle {course(energies, 'mJ')}"
 
 
 def _area(loop: h5py.Group) -> float:
@@ -140,7 +141,7 @@ def _draw_parameter(axis: Axes, file: h5py.File, name: str) -> None:
     energies = [TO_JOULES * float(state.attrs["energy"]) for state in states]
     values = [factor * float(state.attrs[name]) for state in states]
     axis.plot(energies, values, "o", color=BLACK, mfc="none", label="reported states")
-    axis.set(xlabel="energy dissipated so far [J]", ylabel=label)
+    axis.set(xlabel="dissipated energy [J]", ylabel=label)
     axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
 
 
@@ -148,25 +149,22 @@ def _draw_ageing(left: Axes, right: Axes, group: h5py.Group) -> None:
     """Draw the energy of a cycle, and the number of cycles so far, over the dissipated energy."""
     energy = TO_JOULES * group["energy"][()]
     left.plot(energy, group["energy_per_cycle"][()], color=BLUE)
-    left.set(ylabel="energy of a cycle [mJ]", ylim=(0.0, HEADROOM * max(left.dataLim.y1, 1e-300)))
+    left.set(ylabel="energy per cycle [mJ]", ylim=(0.0, HEADROOM * max(left.dataLim.y1, 1e-300)))
     right.plot(energy, group["cycles"][()], color=ORANGE)
     right.set(ylabel="cycles", ylim=(0.0, None))
-    right.yaxis.set_major_formatter("{x:,.0f}")
+    grouped_ticks(right.yaxis)
     for axis in (left, right):
-        axis.set_xlabel("energy dissipated so far [J]")
+        axis.set_xlabel("dissipated energy [J]")
 
 
 def _evolution_title(group: h5py.Group, panels: list[str], aged: bool) -> str:
     texts = []
     for name in panels[:2]:
         _, factor, label = SHOWN[name]
-        first, last = factor * group[name][()][[0, -1]]
         word, _, unit = label.rstrip("]").partition(" [")
-        texts.append(f"{word} {first:.3g} → {last:.3g} {unit}".removesuffix(" 1"))
-    text = ", ".join(texts)
-    if aged:
-        text += f" in {group['cycles'][-1]:,.0f} cycles"
-    return text[0].upper() + text[1:]
+        texts.append(f"{word} {course(factor * group[name][()], unit)}".strip())
+    during = f" in {times(round(group['cycles'][-1]))} cycles" if aged else ""
+    return f"The {' and the '.join(texts)}{during}"
 
 
 # --- hammer blows -------------------------------------------------------------------------------
@@ -191,7 +189,8 @@ def frequency_response(file: h5py.File, contents: MotionContents) -> Figure:
     bottom.set(title="whole record", xlabel="frequency [Hz]", xlim=(0.0, highest))
     for axis in (top, bottom):
         axis.set_ylabel("acceleration / force [m/s²/N]")
-    legend_below(figure, [top], title="dissipated so far")
+        plain_ticks(axis.yaxis)
+    legend_below(figure, [top], title="energy dissipated before")
     return figure
 
 
@@ -210,11 +209,8 @@ def _response_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
     peaks = [_first(response, "frequency") for _, _, response in shown]
     heights = [TO_METRES * _first(response, "peak") for _, _, response in shown]
     if len(shown) == 1:
-        return f"First mode at {peaks[0]:.4g} Hz"
-    return (
-        f"First mode {peaks[0]:.4g} → {peaks[-1]:.4g} Hz with wear, its peak "
-        f"{heights[0]:.3g} → {heights[-1]:.3g} m/s²/N"
-    )
+        return f"The first mode is at {rounded(peaks[0])} Hz"
+    return f"The first mode {course(peaks, 'Hz')} with wear, its peak {course(heights, 'm/s²/N')}"
 
 
 # Least ranges of the axes of a ring-down, as smaller changes are noise: of the frequency [%], and
@@ -225,7 +221,7 @@ LEAST_SOFTENING, LEAST_DAMPING = 0.1, 0.1
 def ring_down(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw frequency and damping of the first mode against its amplitude, and the motion itself."""
     shown = _states(file, contents, "motion")
-    figure = new_figure("First mode of the ring-down against its amplitude", 9.0)
+    figure = new_figure(_ring_down_title(shown), 9.0)
     places = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.3))
     history = figure.add_subplot(places[0, :])
     left, right = (figure.add_subplot(places[1, place]) for place in (0, 1))
@@ -240,8 +236,8 @@ def ring_down(file: h5py.File, contents: MotionContents) -> Figure:
         left.semilogx(amplitude, softened, color=colour)
         right.loglog(amplitude, 100.0 * np.abs(envelope["damping_ratio"][()]), color=colour)
     history.set(xlabel="time [s]", ylabel=f"displacement of {_seen(file)} [µm]")
-    legend_below(figure, [history], columns=2, title="dissipated so far")
-    left.set_ylabel("frequency over that of the stuck joint [%]")
+    legend_below(figure, [history], columns=2, title="energy dissipated before")
+    left.set_ylabel("frequency change from the stuck joint [%]")
     right.set_ylabel("damping ratio [%]")
     for axis in (left, right):
         axis.set_xlabel(f"amplitude of {_seen(file)} [µm]")
@@ -250,6 +246,23 @@ def ring_down(file: h5py.File, contents: MotionContents) -> Figure:
     widen(right, LEAST_DAMPING)
     plain_ticks(right.yaxis)
     return figure
+
+
+def _ring_down_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
+    """Return the title: the lowest frequency of the first mode, and its highest damping."""
+    found = [
+        (100.0 * (envelope["frequency"][()].min() / moved.parent.attrs["stuck"][0] - 1.0), envelope)
+        for _, _, moved in shown
+        if (envelope := moved.parent.get("ring_down"))
+    ]
+    if not found:
+        return "The motion has no ring-down of the first mode"
+    lowest = min(change for change, _ in found)
+    damping = max(100.0 * np.abs(envelope["damping_ratio"][()]).max() for _, envelope in found)
+    return (
+        f"The first mode is up to {abs(lowest):.2g}% below the stuck joint's, "
+        f"its damping ratio up to {damping:.2g}%"
+    )
 
 
 def _draw_history(axis: Axes, moved: h5py.Group, colour: Any, label: str) -> None:
@@ -273,7 +286,8 @@ def _faded(moved: h5py.Group) -> int:
 def motion(file: h5py.File, contents: MotionContents) -> Figure:
     """Draw force, displacement and the energy that the joint has dissipated, over time."""
     shown = _states(file, contents, "motion")
-    figure = new_figure("Motion of the rig under its excitation", 9.0)
+    lost = [float(history["dissipated"][-1]) for _, _, history in shown]
+    figure = new_figure(f"The energy dissipated in the motion {course(lost, 'mJ')}", 9.0)
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     longest = max(_faded(history) for _, _, history in shown)
     for label, colour, history in shown:
@@ -284,10 +298,10 @@ def motion(file: h5py.File, contents: MotionContents) -> Figure:
             top.plot(time, history["excitation"][:longest:every], color=BLACK, linewidth=1.0)
         middle.plot(time, TO_MICRONS * history["displacement"][:longest:every, -1], **look)
         bottom.plot(time, history["dissipated"][:longest:every], **look)
-    top.set_ylabel("excitation [N]")
+    top.set_ylabel("exciting force [N]")
     middle.set_ylabel(f"displacement of {_seen(file)} [µm]")
-    bottom.set(xlabel="time [s]", ylabel="dissipated by the joint [mJ]")
-    legend_below(figure, [middle], title="dissipated before")
+    bottom.set(xlabel="time [s]", ylabel="dissipated energy [mJ]")
+    legend_below(figure, [middle], title="energy dissipated before")
     return figure
 
 

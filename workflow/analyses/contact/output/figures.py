@@ -33,16 +33,19 @@ from workflow.pictures.panels import (
     legend_below,
     legend_of_colours,
     new_figure,
+    rounded,
     shaded,
     spread,
 )
 from workflow.pictures.scales import TO_MICRONS
-from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE
+from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PALE_BLUE, PALE_ORANGE, SHADE
 from workflow.shell.output.results import grid_of, own
 
 # One style per profile, as those of a closed cycle coincide.
 DASHES = ("-", "--", "-.", ":", (0, (8, 2)), (0, (1, 3)))
-STICK, SLIP = "#9DC3DE", "#F2B48C"
+STICK, SLIP = PALE_BLUE, PALE_ORANGE
+# Resultants in words, by their first letter.
+NAMES = {"P": "normal force", "Q": "tangential force", "M": "moment"}
 # Number of arrows along the longer side of a map.
 ARROWS = 17
 # Least number of points of a curve.
@@ -81,8 +84,8 @@ def profiles(file: h5py.File) -> Figure:
     if sheared:
         pressure = middle(_states(file)[last]["pressure"][()], 0)
         limit = float(file.attrs["friction"]) * pressure
-        label = f"±µp, {_states(file)[last].attrs['increment']}"
-        axes[1].fill_between(x, -limit, limit, color="#BBBBBB", alpha=0.4, lw=0, label=label)
+        label = f"±µp in increment {_states(file)[last].attrs['increment']}"
+        axes[1].fill_between(x, -limit, limit, color=SHADE, alpha=0.4, lw=0, label=label)
         component = "xy"[along]
         axes[1].set_ylabel(f"shear q{component} [MPa]")
         axes[1].set_title(f"shear along {component}{place}")
@@ -94,8 +97,8 @@ def profiles(file: h5py.File) -> Figure:
 def _profile_title(file: h5py.File, name: str) -> str:
     state = _states(file)[name]
     pressure, shear = state["pressure"][()].max(), np.hypot(*state["shear"][()]).max()
-    text = f"Increment {state.attrs['increment']}: pressure at most {pressure:.4g} MPa"
-    return f"{text}, shear {shear:.4g} MPa" if shear else text
+    sheared = f" and the largest shear {rounded(shear, 4)} MPa" if shear else ""
+    return f"The peak pressure is {rounded(pressure, 4)} MPa{sheared} in {_increment(state)}"
 
 
 def _shown(file: h5py.File) -> list[str]:
@@ -153,16 +156,35 @@ def maps(file: h5py.File) -> Figure:
     height = view.size[not turned] / view.size[turned]
     panels = 1 + bool(shear.any())
     columns = 1 if height <= FLAT else panels
-    title = f"Increment {_loads(file, name)}"
-    figure, axes = scaled_panels(title, [height] * (panels // columns), columns)
+    figure, axes = scaled_panels(_maps_title(file, name), [height] * (panels // columns), columns)
     first = axes.flat[0]
     image = draw_map(first, pressure, grid, float(pressure.max()) or 1.0, view, turned)
-    first.set_title(f"pressure: at most {pressure.max():.4g} MPa")
+    first.set_title("pressure")
     figure.colorbar(image, ax=first, label="pressure [MPa]", pad=0.01)
     if panels > 1:
         _draw_regions(figure, axes.flat[1], state, grid, view, turned)
     name_sides(axes, turned)
     return figure
+
+
+def _maps_title(file: h5py.File, name: str) -> str:
+    """Return the title: the peak pressure and, with shear, how much of the contact sticks."""
+    state = _states(file)[name]
+    peak = f"the peak pressure is {rounded(float(state['pressure'][()].max()), 4)} MPa"
+    if state["shear"][()].any():
+        peak += f" and {percent(_stuck(state))} of the contact sticks"
+    return f"In {_increment(state)}, {peak}"
+
+
+def _stuck(state: h5py.Group) -> float:
+    """Return the share of the contact that sticks."""
+    pressed = state["pressure"][()] > 0.0
+    stuck = np.count_nonzero(pressed & state["sticking"][()].astype(bool))
+    return stuck / max(int(np.count_nonzero(pressed)), 1)
+
+
+def _increment(state: h5py.Group) -> str:
+    return f"increment {state.attrs['increment']}"
 
 
 def _last_touching(file: h5py.File) -> str:
@@ -182,9 +204,8 @@ def _draw_regions(
     shown = draw_map(axis, regions, grid, 2.0, view, turned)
     shown.set_cmap(ListedColormap(["white", STICK, SLIP]))
     _draw_arrows(axis, state["shear"][()], grid, view, turned)
-    stuck = np.count_nonzero(regions == 1.0) / max(int(np.count_nonzero(pressed)), 1)
-    axis.set_title(f"shear on body 2: {percent(stuck)} of the contact sticks")
-    legend_of_colours(figure, {"stick": STICK, "slip": SLIP})
+    axis.set_title("shear on body 2 (arrows)")
+    legend_of_colours(figure, {"sticks": STICK, "slips": SLIP})
 
 
 def _draw_arrows(axis: Axes, shear: Array, grid: Grid, view: FaceWindow, turned: bool) -> None:
@@ -230,21 +251,21 @@ def forces(file: h5py.File) -> Figure:
     # To thousandths of mm or rad.
     moved, words = TO_MICRONS * motions, motion.replace("_", " ")
     left.plot(moved, values, line, color=BLUE, markersize=4)
-    left.plot(moved[-1:], values[-1:], "D", color=ORANGE, label="last")
+    left.plot(moved[-1:], values[-1:], "D", color=ORANGE, label="last increment")
     left.set_xlabel(f"{words} [{'mrad' if history[motion].attrs['unit'] == 'rad' else 'µm'}]")
-    left.set_ylabel(f"{force} [{history[force].attrs['unit']}]")
-    left.set_title(f"{force} against {words} of body 1")
+    left.set_ylabel(f"{NAMES[force[0]]} {force} [{history[force].attrs['unit']}]")
+    left.set_title(f"{force} against the {words} of body 1")
     legend_below(figure, [left])
     right.plot(history["increment"][()], energy, line, color=GREEN, markersize=4)
     right.set(xlabel="increment", title="energy dissipated by slip")
-    right.set_ylabel(f"energy dissipated so far [{_in_millijoules(history)}]")
+    right.set_ylabel(f"dissipated energy [{_in_millijoules(history)}]")
     return figure
 
 
 def _forces_title(history: h5py.Group, energy: float) -> str:
-    text = f"{energy:.4g} {_in_millijoules(history)} dissipated in total"
+    text = f"Slip dissipates {rounded(energy)} {_in_millijoules(history)} in total"
     if history.attrs["method"] != "full":
-        text += "; only turning points are computed"
+        text += " (only turning points are computed)"
     return text
 
 

@@ -12,7 +12,7 @@ from sa_solver.types import Array, Indices
 from workflow.analyses.vibration.case.excitation import amount_in, load_text
 from workflow.analyses.vibration.figures.stability import draw_motions
 from workflow.analyses.vibration.output.outcome import VibrationContents
-from workflow.pictures.panels import plain_ticks, spread
+from workflow.pictures.panels import plain_ticks, rounded, spread
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK
 
@@ -58,7 +58,8 @@ def draw_response(axis: Axes, response: h5py.Group) -> None:
     size = TO_MICRONS * response["amplitude"][:, -1] / force
     draw_motions(axis, response, response["frequency"][()], size, color=BLACK)
     mark_resonance(axis, response)
-    axis.set_title(f"{load_text(response.attrs)}: {response.attrs['resonance']:.4g} Hz")
+    resonance = rounded(response.attrs["resonance"], 4)
+    axis.set_title(f"{load_text(response.attrs)}: resonance at {resonance} Hz")
 
 
 def mark_resonance(axis: Axes, response: h5py.Group) -> None:

@@ -6,9 +6,9 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.vibration.case.excitation import load_text
+from workflow.analyses.vibration.case.excitation import under_in
 from workflow.analyses.vibration.output.outcome import VibrationContents
-from workflow.pictures.panels import legend_below, new_figure, shaded
+from workflow.pictures.panels import grouped_ticks, legend_below, new_figure, rounded, shaded
 from workflow.pictures.style import BLACK
 
 # More resonances than this would overlap.
@@ -30,17 +30,19 @@ def engine_orders(file: h5py.File, contents: VibrationContents) -> Figure:
     for name, style in STYLES.items():
         modes = file["linear"].attrs[name]
         for number, mode in enumerate(modes[(modes > span[0]) & (modes < span[1])]):
-            label = f"natural, joints {name}" if number == 0 else None
+            label = f"natural frequency, joints {name}" if number == 0 else None
             axis.axhline(mode, color=BLACK, linestyle=style, linewidth=0.8, label=label)
     axis.plot(speeds, span, color=BLACK, label=f"order {order:g}")
-    for multiple in MULTIPLES:
+    for multiple in (m for m in MULTIPLES if m * span[0] < span[1]):
         label = f"order {multiple * order:g}"
         axis.plot(speeds, multiple * span, color=BLACK, linewidth=0.5, label=label)
     for name, colour in shaded(contents.responses, MOST_DOTS):
         numbers = file["responses"][name].attrs
         at = 60.0 * float(numbers["resonance"]) / order
-        axis.plot(at, numbers["resonance"], "o", color=colour, label=load_text(numbers), zorder=4)
-    axis.set(xlabel="speed [rpm]", ylabel="frequency [Hz]", xlim=speeds, ylim=(0.0, span[1]))
+        label = f"resonance {under_in(numbers)}"
+        axis.plot(at, numbers["resonance"], "o", color=colour, label=label, zorder=4)
+    axis.set(xlabel="engine speed [rpm]", ylabel="frequency [Hz]", xlim=speeds, ylim=(0.0, span[1]))
+    grouped_ticks(axis.xaxis)
     legend_below(figure, [axis], columns=4)
     return figure
 
@@ -48,6 +50,7 @@ def engine_orders(file: h5py.File, contents: VibrationContents) -> Figure:
 def _title(responses: list[h5py.Group], order: float) -> str:
     ends = [responses[0].attrs, responses[-1].attrs][: len(responses)]
     at = (
-        f"{60.0 * numbers['resonance'] / order:.4g} rpm, {load_text(numbers)}" for numbers in ends
+        f"at {rounded(60.0 * numbers['resonance'] / order, 4)} rpm {under_in(numbers)}"
+        for numbers in ends
     )
-    return f"Engine order {order:g} meets resonance at {'; '.join(at)}"
+    return f"Engine order {order:g} meets the resonance {' and '.join(at)}"

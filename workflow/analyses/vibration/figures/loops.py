@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from sa_solver.types import Array
 from workflow.analyses.vibration.case.excitation import load_text, under_in
 from workflow.analyses.vibration.output.outcome import VibrationContents
-from workflow.pictures.panels import legend_below, new_figure, shaded
+from workflow.pictures.panels import legend_below, new_figure, rounded, shaded
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 
 # More loops than this would overlap.
@@ -41,15 +41,15 @@ def loops(file: h5py.File, contents: VibrationContents) -> Figure:
         _draw_branch(right, _finest(response), colour, load_text(response.attrs))
     _bound(right, [_finest(response) for response in shown])
     _label(left, right, shown[0])
-    legend_below(figure, [right], columns=3, title="excitation: stick slope (dashed)")
+    legend_below(figure, [right], columns=3, title="excitation: slope while sticking (dashed)")
     return figure
 
 
 def _label(left: Axes, right: Axes, response: h5py.Group) -> None:
     finest, coarse = _finest(response), _resolutions(response)[:-1]
-    text = f"{finest.attrs['frequency']:.4g} Hz, {_harmonics(finest)} harmonics"
+    text = f"{rounded(finest.attrs['frequency'], 4)} Hz, {_harmonics(finest)} harmonics"
     if coarse:
-        text += f"; dashed: the force in {', '.join(map(_harmonics, coarse))} alone"
+        text += f" (dashed: the force of {', '.join(map(_harmonics, coarse))} alone)"
     left.set(title=text, xlabel="displacement [µm]", ylabel="tangential force [N]")
     right.set_title("rising branches from one origin")
     right.set(xlabel="displacement since the reversal [µm]", ylabel="force since the reversal [N]")
@@ -88,7 +88,7 @@ def rising_branch(displacement: Array, force: Array) -> tuple[Array, Array]:
 def _draw_branch(axis: Axes, loop: h5py.Group, colour: Any, label: str) -> None:
     moved, gained = rising_branch(*_curve(loop))
     slope = _slope(loop)
-    text = f"{label}: {slope:.4g} N/µm" if np.isfinite(slope) else f"{label}: none"
+    text = f"{label}: {rounded(slope)} N/µm" if np.isfinite(slope) else f"{label}: none"
     axis.plot(moved, gained, color=colour, label=text)
     if np.isfinite(slope):
         top = gained.max()
@@ -114,15 +114,16 @@ def _bound(axis: Axes, shown: list[h5py.Group]) -> None:
 
 def _title(shown: list[h5py.Group]) -> str:
     slopes = np.array([_slope(_finest(response)) for response in shown])
-    text = f"A cycle loses {', '.join(map(_lost, (shown[0], shown[-1])[: len(shown)]))}"
+    slides = [response for response in shown if _finest(response).attrs["slip"] > 0.0]
+    text = f"A cycle dissipates {' and '.join(map(_lost, slides[:: max(1, len(slides) - 1)]))}"
+    if not slides:
+        text = "No loop slides"
     if np.isfinite(slopes).any():
-        low, high = (f"{slope:.4g}" for slope in (np.nanmin(slopes), np.nanmax(slopes)))
-        text += f"; it sticks with {low if low == high else f'{low} to {high}'} N/µm"
+        low, high = (rounded(slope) for slope in (np.nanmin(slopes), np.nanmax(slopes)))
+        text += f"; slope while sticking {low if low == high else f'{low} to {high}'} N/µm"
     return text
 
 
 def _lost(response: h5py.Group) -> str:
     """Return the energy of a loop, as text."""
-    loop = _finest(response).attrs
-    energy = f"{loop['energy']:.3g} mJ" if loop["slip"] > 0.0 else "nothing"
-    return f"{energy} {under_in(response.attrs)}"
+    return f"{rounded(_finest(response).attrs['energy'])} mJ {under_in(response.attrs)}"

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from workflow.analyses.vibration.output.outcome import VibrationContents
-from workflow.pictures.panels import legend_below, new_figure, plain_ticks, spread
+from workflow.pictures.panels import course, legend_below, new_figure, plain_ticks, rounded, spread
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE
 
@@ -57,6 +57,6 @@ def _title(file: h5py.File, contents: VibrationContents) -> str:
     first = file["modes"][contents.modes[0]].attrs
     begin, end = first["frequency"]
     return (
-        f"Mode {first['mode']}: {begin:.4g} Hz at the smallest amplitude, {end:.4g} at the "
-        f"largest, damping up to {TO_PERCENT * first['most_damped']:.3g} %"
+        f"Mode {first['mode']} {course([begin, end], 'Hz', 4)} with its amplitude, with a damping "
+        f"ratio of up to {rounded(TO_PERCENT * first['most_damped'])} %"
     )

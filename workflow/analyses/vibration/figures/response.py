@@ -21,7 +21,7 @@ from workflow.analyses.vibration.figures.stability import (
     draw_motions,
     explain_stability,
 )
-from workflow.analyses.vibration.figures.states import node_states, pad_states
+from workflow.analyses.vibration.figures.states import pad_states
 from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.models.vibration.amount import ExcitationSize
 from workflow.pictures.panels import (
@@ -30,10 +30,11 @@ from workflow.pictures.panels import (
     new_figure,
     plain_ticks,
     present,
+    rounded,
     shaded,
 )
 from workflow.pictures.scales import TO_MICRONS
-from workflow.pictures.style import BLACK, BLUE, HEADROOM, ORANGE
+from workflow.pictures.style import BLACK, BLUE, HEADROOM
 
 # More curves than this would overlap.
 MOST_CURVES = 8
@@ -60,7 +61,6 @@ def figures_of(contents: VibrationContents) -> Figures:
         "loops": (loops, bool(contents.loops)),
         "joint_states": (joint_states, contents.joints and not many),
         "node_shares": (node_shares, many),
-        "node_states": (node_states, contents.places),
         "pad_states": (pad_states, contents.places),
     }
     return present(drawn, contents)
@@ -99,11 +99,11 @@ def frequency_response(file: h5py.File, contents: VibrationContents) -> Figure:
     linear = file["linear"]
     for name, style in STYLES.items():
         frequency, receptance = linear["frequency"][()], TO_MICRONS * linear[name][()]
-        label = f"{name}: {frequency[receptance.argmax()]:.4g} Hz"
+        label = f"joints {name}: {rounded(frequency[receptance.argmax()], 4)} Hz"
         axis.plot(frequency, receptance, style, label=label, **LIMIT)
     for response, colour in _shown(file, contents):
         _, force = amount_in(response.attrs)
-        label = f"{load_text(response.attrs)}: {response.attrs['resonance']:.4g} Hz"
+        label = f"{load_text(response.attrs)}: {rounded(response.attrs['resonance'], 4)} Hz"
         draw_amplitudes(axis, response, TO_MICRONS / force, color=colour, label=label)
         _draw_phase(phase, response, color=colour)
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
@@ -124,7 +124,7 @@ def frequency_response(file: h5py.File, contents: VibrationContents) -> Figure:
     axis.set_ylabel(f"amplitude of {_seen(file)} / {amount.name} [{amount.receptance[1]}]")
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
     plain_ticks(axis.yaxis)
-    legend_below(figure, [axis], columns=4, title="resonance")
+    legend_below(figure, [axis], columns=4, title="resonance frequency")
     return figure
 
 
@@ -170,12 +170,13 @@ def _over_frequency(axis: Axes, file: h5py.File) -> None:
 def _title(file: h5py.File) -> str:
     responses = [file["responses"][name] for name in sorted(file["responses"])]
     first, last = responses[0].attrs, responses[-1].attrs
-    if len(responses) == 1:
-        return f"Resonance at {first['resonance']:.4g} Hz {under_in(first)}"
-    return (
-        f"Resonance {first['resonance']:.4g} Hz {under_in(first)}, "
-        f"{last['resonance']:.4g} Hz {under_in(last)}"
+    before, after = (
+        f"{rounded(ends['resonance'], 4)} Hz {under_in(ends)}" for ends in (first, last)
     )
+    if len(responses) == 1:
+        return f"The resonance is at {before}"
+    moves = "rises" if last["resonance"] > first["resonance"] else "falls"
+    return f"The resonance {moves} from {before} to {after}"
 
 
 # --- resonance ----------------------------------------------------------------------------------
@@ -194,8 +195,8 @@ def resonance(file: h5py.File, contents: VibrationContents) -> Figure:
             force = file["backbone"][_amount_of(file).name][()]
             values = factor * file["backbone"][name][()]
             panel.plot(force, values, color=BLACK, linewidth=1.0, label="phase resonance")
-    _draw_peaks(top, file, "resonance", 1.0, BLUE)
-    _draw_peaks(bottom, file, "damping", TO_PERCENT, ORANGE)
+    _draw_peaks(top, file, "resonance", 1.0)
+    _draw_peaks(bottom, file, "damping", TO_PERCENT)
     top.set_ylabel("resonance frequency [Hz]")
     amount = _amount_of(file)
     bottom.set(xlabel=f"{amount.name} [{amount.unit}]", ylabel="damping ratio [%]", xscale="log")
@@ -222,12 +223,12 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: VibrationContents) -
     plain_ticks(axis.yaxis)
 
 
-def _draw_peaks(axis: Axes, file: h5py.File, name: str, factor: float, colour: str) -> None:
+def _draw_peaks(axis: Axes, file: h5py.File, name: str, factor: float) -> None:
     """Draw the value at the peak of each response as a dot."""
     peaks = [response.attrs for response in file["responses"].values()]
     forces = [amount_in(peak)[1] for peak in peaks]
     values = [factor * peak[name] for peak in peaks]
-    axis.plot(forces, values, "o", color=colour, label="largest amplitude")
+    axis.plot(forces, values, "o", color=BLUE, label="largest amplitude")
     axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
 
 
@@ -236,6 +237,6 @@ def _resonance_title(file: h5py.File) -> str:
     resonances = [float(peak["resonance"]) for peak in peaks]
     most = max(peaks, key=lambda peak: float(peak["damping"]))
     return (
-        f"Resonance between {min(resonances):.4g} and {max(resonances):.4g} Hz; highest damping "
-        f"{under_in(most)}: {TO_PERCENT * most['damping']:.3g} %"
+        f"Resonance from {rounded(min(resonances), 4)} to {rounded(max(resonances), 4)} Hz; "
+        f"the damping ratio reaches {rounded(TO_PERCENT * most['damping'])} % {under_in(most)}"
     )

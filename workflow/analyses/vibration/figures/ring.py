@@ -6,9 +6,9 @@ import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
-from workflow.analyses.vibration.case.excitation import load_text
+from workflow.analyses.vibration.case.excitation import under_in
 from workflow.analyses.vibration.output.outcome import VibrationContents
-from workflow.pictures.panels import legend_below, new_figure, whole_ticks
+from workflow.pictures.panels import legend_below, new_figure, rounded, whole_ticks
 from workflow.pictures.style import BLACK, BLUE, ORANGE
 
 # Most modes that are drawn, from the lowest. More would overlap.
@@ -26,30 +26,32 @@ def nodal_diameters(file: h5py.File, contents: VibrationContents) -> Figure:
     sectors, order = int(group.attrs["sectors"]), int(file.attrs["engine_order"])
     numbers = file["responses"][contents.responses[-1]].attrs
     resonance = float(numbers["resonance"])
-    figure = new_figure(_title(sectors, order, numbers), 7.0)
+    figure = new_figure(_title(order, numbers), 7.0)
     axis = figure.subplots()
     diameters = group["diameters"][()]
     for name, style, colour in (("free", "o:", BLUE), ("stuck", "s--", ORANGE)):
         for number, mode in enumerate(group[name][:, :MOST_MODES].T):
-            label = f"natural, joints {name}" if number == 0 else None
+            label = f"natural frequency, joints {name}" if number == 0 else None
             axis.plot(diameters, mode, style, color=colour, linewidth=0.8, label=label)
     highest = ABOVE * max(resonance, group["stuck"][:, 0].max())
     orders = np.arange(int(highest / resonance * order) + 2)
     folded = np.minimum(orders % sectors, -orders % sectors)
     frequencies = orders * resonance / order
-    speed = f"{60.0 * resonance / order:.4g} rpm"
-    axis.plot(folded, frequencies, color=BLACK, linewidth=0.8, label=f"orders at {speed}")
+    speed = f"{rounded(60.0 * resonance / order, 4)} rpm"
+    axis.plot(folded, frequencies, color=BLACK, linewidth=0.8, label=f"engine orders at {speed}")
     driven = (orders % order == 0) & (orders > 0)
-    axis.plot(folded[driven], frequencies[driven], "D", color=BLACK, label="of the excitation")
-    axis.set(xlabel="nodal diameters", ylabel="frequency [Hz]", ylim=(0.0, highest))
+    axis.plot(
+        folded[driven], frequencies[driven], "D", color=BLACK, label="harmonics of the excitation"
+    )
+    axis.set(xlabel="number of nodal diameters", ylabel="frequency [Hz]", ylim=(0.0, highest))
     whole_ticks(axis.xaxis)
     legend_below(figure, [axis], columns=2)
     return figure
 
 
-def _title(sectors: int, order: int, numbers: h5py.AttributeManager) -> str:
+def _title(order: int, numbers: h5py.AttributeManager) -> str:
     diameters = abs(int(numbers["nodal_diameters"][list(numbers["harmonics"]).index(1)]))
     return (
-        f"Engine order {order} on {sectors} sectors: {diameters} nodal diameters, resonance at "
-        f"{numbers['resonance']:.4g} Hz, {load_text(numbers)}"
+        f"Engine order {order} excites {diameters} nodal diameters, with a resonance at "
+        f"{rounded(numbers['resonance'], 4)} Hz {under_in(numbers)}"
     )

@@ -23,13 +23,13 @@ from workflow.analyses.vibration.figures.columns import (
 from workflow.analyses.vibration.figures.states import KINDS, kinds_of
 from workflow.analyses.vibration.output.outcome import VibrationContents
 from workflow.pictures.panels import legend_of_colours, new_figure, whole_ticks
-from workflow.pictures.style import BLUE, COLOUR_MAP, ORANGE
+from workflow.pictures.style import BLUE, COLOUR_MAP, ORANGE, SHADE
 
 # Most rows of joints that are still readable.
 MOST_JOINTS = 6
 TO_PERCENT = 1e2
 # States of a joint that fill the period, from the bottom of its panel.
-DOES = {"sticks or is closed": BLUE, "slips": ORANGE, "is open": "#B8B8B8"}
+DOES = {"sticks or is closed": BLUE, "slips": ORANGE, "is open": SHADE}
 # Heights of the response, of the panels below it, and of the margins [inch].
 RESPONSE, STRIP, MAP, AROUND = 2.2, 1.5, 2.6, 1.6
 
@@ -59,45 +59,50 @@ def joint_states(file: h5py.File, contents: VibrationContents) -> Figure:
             mark_resonance(axis, response)
     label_columns(panels, shown[0])
     for axis, joint in zip(panels[1:, 0], joints, strict=True):
-        axis.set_ylabel(f"{names[joint]}\n[% of period]")
+        axis.set_ylabel(f"{names[joint]}: share\nof period [%]")
     legend_of_colours(figure, DOES)
     return figure
 
 
 def node_shares(file: h5py.File, contents: VibrationContents) -> Figure:
-    """Draw shares of the period in which many joints slip and are apart, and counts by state."""
+    """Draw shares of the period in which many joints slip and are apart, and counts by state.
+
+    If no joint is ever apart, there are no maps of that.
+    """
     shown = shown_responses(file, contents)
-    figure = new_figure(_most_at_once(shown), AROUND + RESPONSE + 2.0 * MAP + STRIP)
+    maps = ("slip", "separation")[: 1 + any(r["nodes/separated"][()].any() for r in shown)]
+    title = _most_at_once(shown, "nodes" if contents.places else "joints")
+    figure = new_figure(title, AROUND + RESPONSE + len(maps) * MAP + STRIP)
     panels = figure.subplots(
-        *(4, len(shown)),
+        *(2 + len(maps), len(shown)),
         sharex=True,
         sharey="row",
         squeeze=False,
-        height_ratios=(RESPONSE, MAP, MAP, STRIP),
+        height_ratios=(RESPONSE, *(MAP for _ in maps), STRIP),
     )
-    order, ticks, label = np.arange(contents.joints), None, "joints by number"
+    order, ticks, label = np.arange(contents.joints), None, "number of joint"
     if contents.places:
         order, ticks = by_distance(file)
-        label = "distance from the middle [mm]"
+        label = "distance from middle [mm]"
     for column, response in zip(panels.T, shown, strict=True):
         draw_response(column[0], response)
         frequency, points = along(response)
-        for axis, shares in zip(column[1:3], _shares(response, points), strict=True):
+        for axis, shares in zip(column[1:-1], _shares(response, points), strict=False):
             mesh = _draw_map(axis, frequency, shares[:, order])
         kinds = kinds_of(response)[points]
         counts = [(kinds == kind).mean(axis=1, keepdims=True) for kind in range(len(KINDS))]
-        _draw_stack(column[3], frequency, counts, 0, tuple(KINDS.values()))
+        _draw_stack(column[-1], frequency, counts, 0, tuple(KINDS.values()))
         for axis in column[1:]:
             mark_resonance(axis, response)
     label_columns(panels, shown[0])
-    for axis, what in zip(panels[1:3, 0], ("slips", "apart"), strict=True):
-        axis.set_ylabel(f"{what}\n{label}")
+    for axis, what in zip(panels[1:-1, 0], maps, strict=True):
+        axis.set_ylabel(f"{what} by\n{label}")
         if ticks:
             axis.set_yticks(*ticks)
         else:
             whole_ticks(axis.yaxis)
-    panels[3, 0].set_ylabel("[% of nodes]" if contents.places else "[% of joints]")
-    figure.colorbar(mesh, ax=panels[1:3], label="share of the period [%]", aspect=40)
+    panels[-1, 0].set_ylabel("nodes [%]" if contents.places else "joints [%]")
+    figure.colorbar(mesh, ax=panels[1:-1], label="share of period [%]", aspect=20 * len(maps))
     legend_of_colours(figure, KINDS)
     return figure
 
@@ -168,11 +173,10 @@ def _most_slipping(shown: list[h5py.Group], names: list[str]) -> str:
     return f"No joint slips or opens {under_in(response.attrs)}"
 
 
-def _most_at_once(shown: list[h5py.Group]) -> str:
+def _most_at_once(shown: list[h5py.Group], what: str) -> str:
     """Return text on the most joints that slip, and are apart, at some time of a cycle."""
-    texts = []
-    for name, word in (("slip", "slip"), ("separated", "are open")):
-        shares = shown[-1][f"nodes/{name}"][()]
-        texts.append(f"{(shares > 0.0).sum(axis=1).max()} {word}")
-    count = shares.shape[1]
-    return f"Of {count} joints at most {' and '.join(texts)} at times {under_in(shown[-1].attrs)}"
+    shares = [shown[-1][f"nodes/{name}"][()] for name in ("slip", "separated")]
+    slip, apart = (int((share > 0.0).sum(axis=1).max()) for share in shares)
+    under = under_in(shown[-1].attrs)
+    opening = f"up to {apart} open" if apart else "none opens"
+    return f"Up to {slip} of {shares[0].shape[1]} {what} slip {under}, and {opening}"

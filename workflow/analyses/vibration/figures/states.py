@@ -1,4 +1,4 @@
-"""Figures of a vibration case: nodes of a contact that stick, slip and lift off."""
+"""Figure of a vibration case: nodes of a contact that stick, slip and lift off."""
 
 from __future__ import annotations
 
@@ -13,28 +13,20 @@ from matplotlib.figure import Figure
 from sa_solver.types import Array, Indices
 from workflow.analyses.vibration.case.excitation import load_text, under_in
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
-from workflow.analyses.vibration.figures.columns import (
-    along,
-    by_distance,
-    draw_response,
-    label_columns,
-    largest_at,
-    mark_resonance,
-    shown_responses,
-)
+from workflow.analyses.vibration.figures.columns import largest_at, shown_responses
 from workflow.analyses.vibration.output.outcome import VibrationContents
-from workflow.pictures.panels import legend_of_colours, new_figure
-from workflow.pictures.style import BLUE, ORANGE
+from workflow.pictures.panels import legend_of_colours, new_figure, rounded
+from workflow.pictures.style import BLUE, GREY, ORANGE, PALE, YELLOW
 
-# Most forces with readable maps of the pad.
-MOST_PADS = 6
-# States of a node in a cycle, numbered from 0, with colours (Okabe and Ito's, and greys).
+# Most forces, each with a row of maps.
+MOST_PADS = 4
+# States of a node in a cycle, numbered from 0, with colours.
 KINDS = {
     "sticks": BLUE,
-    "slips, up to half of the cycle": "#F0E442",
+    "slips, up to half of the cycle": YELLOW,
     "slips longer": ORANGE,
-    "lifts off for part of the cycle": "#8A8A8A",
-    "always open": "#E3E3E3",
+    "lifts off for part of the cycle": GREY,
+    "always open": PALE,
 }
 STICKS, SLIPS_BRIEFLY, SLIPS_LONG, LIFTS_OFF, OPEN = range(len(KINDS))
 CELLS: dict[str, Any] = {
@@ -47,47 +39,23 @@ HALF = 0.5
 ROUNDING = 1e-9
 # Frequencies of the maps of the pad, over that of the peak: an octave below and above, or the end
 # of the curve.
-OCTAVES = {"below": 0.5, "at the peak": 1.0, "above": 2.0}
-# Heights of the margins of the maps of the pad, and of the maps [inch]. With more columns than
-# ``WIDE`` the maps are lower.
-AROUND_PADS, PAD_ROWS, WIDE = 2.4, 6.6, 4
-
-
-def node_states(file: h5py.File, contents: VibrationContents) -> Figure:
-    """Draw the state of every node over frequency, below the response, under some forces."""
-    shown = shown_responses(file, contents)
-    figure = new_figure(_title(shown), 8.5)
-    panels = figure.subplots(
-        2, len(shown), sharex=True, sharey="row", squeeze=False, height_ratios=(1.0, 1.6)
-    )
-    order, ticks = by_distance(file)
-    for (top, bottom), response in zip(panels.T, shown, strict=True):
-        draw_response(top, response)
-        edges, points = along(response)
-        kinds = kinds_of(response)[points][:, order]
-        bottom.grid(visible=False)
-        bottom.pcolormesh(edges, np.arange(len(order) + 1), kinds.T, **CELLS)
-        mark_resonance(bottom, response)
-    label_columns(panels, shown[0])
-    panels[1, 0].set_ylabel("nodes by distance from the middle [mm]")
-    panels[1, 0].set_yticks(*ticks)
-    legend_of_colours(figure, KINDS)
-    return figure
+OCTAVES = {"below the peak": 0.5, "at the peak": 1.0, "above the peak": 2.0}
+# Heights of the margins of the maps of the pad, and of a row of maps [inch].
+AROUND_PADS, PAD_ROW = 1.8, 3.6
 
 
 def pad_states(file: h5py.File, contents: VibrationContents) -> Figure:
     """Draw the state of the nodes on the pad: below, at and above the peak of each force."""
     shown = shown_responses(file, contents, MOST_PADS)
-    height = PAD_ROWS * min(1.0, WIDE / len(shown))
-    figure = new_figure(_title(shown), AROUND_PADS + height, compress=True)
-    panels = figure.subplots(len(OCTAVES), len(shown), sharex=True, sharey=True, squeeze=False)
-    for row, (name, factor) in zip(panels, OCTAVES.items(), strict=True):
-        for axis, response in zip(row, shown, strict=True):
+    figure = new_figure(_title(shown), AROUND_PADS + PAD_ROW * len(shown), compress=True)
+    panels = figure.subplots(len(shown), len(OCTAVES), sharex=True, sharey=True, squeeze=False)
+    for row, response in zip(panels, shown, strict=True):
+        for axis, (name, factor) in zip(row, OCTAVES.items(), strict=True):
             place = _point_near(response, factor * float(response.attrs["resonance"]))
-            frequency = response["frequency"][place]
+            frequency = rounded(response["frequency"][place], 4)
             _draw_pad(axis, file["contact"], kinds_of(response)[place])
-            axis.set_title(f"{load_text(response.attrs)}, {frequency:.4g} Hz", fontsize="small")
-        row[0].set_ylabel(f"{name}\ny [mm]")
+            axis.set_title(f"{load_text(response.attrs)}, {frequency} Hz, {name}")
+        row[0].set_ylabel("y [mm]")
     for axis in panels[-1]:
         axis.set_xlabel("x [mm]")
     legend_of_colours(figure, KINDS)
@@ -111,7 +79,7 @@ def _title(shown: list[h5py.Group]) -> str:
         touching = int((kinds != OPEN).sum())
         sticking = int((kinds == STICKS).sum())
         texts.append(f"{sticking} of {touching} {under_in(response.attrs)}")
-    return f"Nodes that touch and only stick at the peak: {', '.join(texts)}"
+    return f"Touching nodes that only stick at the peak: {' and '.join(texts)}"
 
 
 def _point_near(response: h5py.Group, frequency: float) -> int:

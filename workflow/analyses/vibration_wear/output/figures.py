@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import h5py
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from sa_solver.types import Array, Indices
 from workflow.analyses.vibration.case.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.figures.stability import draw_motions, explain_stability
 from workflow.analyses.vibration_wear.output.outcome import VibrationWearContents
+from workflow.case.text.plain import times
 from workflow.models.vibration.amount import FORCE, LEVEL, ExcitationSize
 from workflow.pictures.panels import (
     Figures,
+    course,
     legend_below,
     new_figure,
     plain_ticks,
+    rounded,
     shaded,
     spread,
+    widen,
 )
-from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
+from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE
 from workflow.shell.output.results import grid_of
 
@@ -45,23 +49,27 @@ PEAKS: dict[str, Any] = {
     "markersize": 3.5,
     "linewidth": 0.9,
     "zorder": 4,
-    "label": "all peaks, in turn",
+    "label": "peaks of all states",
 }
 FORCE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
-# Curves over the cycles, two on a panel: dataset, scale and label.
-Curve = tuple[str, float, str]
-MOTION: tuple[Curve, Curve] = (
-    ("stroke", TO_MICRONS, "stroke under the force that wears [µm]"),
+# Curves over the cycles: dataset, scale and label.
+OVER_CYCLES = (
+    ("stiffness", PER_MICRON, "stiffness while stuck [N/µm]"),
+    ("stroke", TO_MICRONS, "stroke [µm]"),
     ("energy_per_cycle", 1.0, "energy per cycle [mJ]"),
+    ("depth", TO_MICRONS, "largest worn depth [µm]"),
 )
-DEPTH: Curve = ("depth", TO_MICRONS, "largest worn depth [µm]")
+ON_GRID = "area", 1.0, "contact area [mm²]"
+AT_NODES = "touching", 1.0, "nodes in contact"
+# Most decades with a number along the cycles.
+MOST_DECADES = 3
+# Smallest range of a panel over the cycles, relative to its largest value.
+LEAST = 0.02
 # Numbers in titles: dataset, scale, unit and description.
-STUCK = "stuck", 1.0, "Hz", "First natural frequency, contact stuck"
-STIFFNESS = "stiffness", PER_MICRON, "N/µm", "Stiffness of the stuck contact"
-DEEPEST = "depth", TO_MICRONS, "µm", "Largest worn depth"
-LOOP_ENERGY = "energy_per_cycle", 1.0, "mJ", "Loop under the force that wears"
-ON_GRID = DEPTH, ("area", 1.0, "area in contact [mm²]")
-AT_NODES = DEPTH, ("touching", 1.0, "nodes in contact")
+STUCK = "stuck", 1.0, "Hz", "The first natural frequency of the stuck contact"
+STIFFNESS = "stiffness", PER_MICRON, "N/µm", "The stiffness of the stuck contact"
+DEEPEST = "depth", TO_MICRONS, "µm", "The largest worn depth"
+LOOP_ENERGY = "energy_per_cycle", 1.0, "mJ", "The energy dissipated in a cycle"
 
 
 def figures_of(contents: VibrationWearContents) -> Figures:
@@ -101,7 +109,9 @@ def frequency_response(file: h5py.File) -> Figure:
         explain_stability(axis, responses)
         over = f"amplitude / {amount.name} [{amount.receptance[1]}]"
         axis.set(title=amount.as_text(forces[place]), ylabel=over, yscale="log")
-        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles: resonance")
+        axis.legend(
+            loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles: resonance frequency"
+        )
     panels[-1].set(xlabel="frequency [Hz]", xscale="log")
     for side in (panels[-1].xaxis, *(axis.yaxis for axis in panels)):
         plain_ticks(side)
@@ -126,21 +136,34 @@ def evolution(file: h5py.File, contents: VibrationWearContents) -> Figure:
     cycles = history["cycles"][()]
     place = np.append(BEFORE * cycles[1], cycles[1:])
     figure = new_figure(_change(file, *STIFFNESS), 9.0)
-    (stiffness, frequency), (motion, depth) = figure.subplots(2, 2, sharex=True)
-    stiffness.plot(place, PER_MICRON * history["stiffness"][()], "o-", color=BLUE)
-    stiffness.set_ylabel("stiffness kt while the contact sticks [N/µm]")
-    frequency.plot(place, history["stuck"][:, 0], "k--", label="stuck")
+    panels = figure.subplots(2, 3, sharex=True)
+    frequency, *others = panels.flat
+    frequency.plot(place, history["stuck"][:, 0], "--", color=BLACK, label="contact stuck")
     columns = spread(range(len(forces)), len(FORCE_COLOURS))
     for column, colour in zip(columns, FORCE_COLOURS, strict=False):
         label = _amount(file).as_text(forces[column])
         frequency.plot(place, history["resonance"][:, column], "o-", color=colour, label=label)
-    frequency.set_ylabel("resonance [Hz]")
+    frequency.set_ylabel("resonance frequency [Hz]")
     legend_below(figure, [frequency], title="resonance")
-    for axis, curves in ((motion, MOTION), (depth, AT_NODES if contents.at_nodes else ON_GRID)):
-        _draw_pair(axis, place, history, curves)
-        axis.set(xlabel="cycles (first point: unworn)", xscale="log")
-        plain_ticks(axis.xaxis)
+    curves = *OVER_CYCLES, AT_NODES if contents.at_nodes else ON_GRID
+    for axis, (name, scale, label) in zip(others, curves, strict=True):
+        axis.plot(place, scale * history[name][()], "o-", color=BLUE)
+        axis.set_ylabel(label)
+    for axis in panels.flat:
+        widen(axis, LEAST * axis.dataLim.y1)
+    for axis in panels[-1]:
+        axis.set(xlabel="cycles", xscale="log")
+    _name_unworn(panels[0, 0].xaxis, place)
     return figure
+
+
+def _name_unworn(line: Axis, place: Array) -> None:
+    """Set ticks at decades of the cycles, and one for the unworn contact at the first place."""
+    first, last = np.ceil(np.log10(place[1])), np.floor(np.log10(place[-1]))
+    decades = 10.0 ** np.arange(first, max(first, last) + 1.0)
+    shown = spread([*decades], MOST_DECADES)
+    line.set_ticks([place[0], *shown], ["unworn", *(f"{cycles:,.0f}" for cycles in shown)])
+    line.set_minor_locator(NullLocator())
 
 
 def scar(file: h5py.File) -> Figure:
@@ -158,7 +181,7 @@ def scar(file: h5py.File) -> Figure:
     depth.invert_yaxis()
     depth.set_ylabel("worn depth [µm]")
     legend_below(figure, [depth], title="cycles")
-    pressure.set_ylabel("pressure [MPa]")
+    pressure.set_ylabel("pressure at rest [MPa]")
     energy.set(xlabel="x [mm]", ylabel="energy per cycle\nand area [mJ/mm²]")
     return figure
 
@@ -204,35 +227,22 @@ def loops(file: h5py.File, contents: VibrationWearContents) -> Figure:
     figure = new_figure(_change(file, *LOOP_ENERGY), 7.0)
     axis = figure.subplots()
     for state, colour in _states(file):
-        label = f"{_cycles(state)}: {state.attrs['energy_per_cycle']:.4g} mJ"
+        label = f"{_cycles(state)}: {rounded(state.attrs['energy_per_cycle'])} mJ"
         axis.plot(*_loop(state["loop"]), color=colour, label=label)
         if not contents.at_nodes:
             axis.plot(*_loop(state["half_space_loop"]), "o", color=colour, markersize=3)
     if contents.at_nodes:
-        axis.set(
-            xlabel="displacement between the targets, or mean of the contacts [µm]",
-            ylabel="force [N]",
-        )
+        axis.set_xlabel("displacement between the targets, or mean of the contacts [µm]")
     else:
-        label = "force [N]; points: whole tangential problem"
-        axis.set(xlabel="displacement of the joint [µm]", ylabel=label)
-    legend_below(figure, [axis], columns=3, title="cycles, energy")
+        axis.set_xlabel("displacement of the joint [µm]")
+        axis.plot([], [], "o", color=BLACK, markersize=3, label="whole tangential problem")
+    axis.set_ylabel("tangential force [N]")
+    legend_below(figure, [axis], columns=3, title="cycles: energy dissipated in a cycle")
     return figure
 
 
 def _loop(group: h5py.Group) -> tuple[Array, Array]:
     return TO_MICRONS * group["displacement"][()], group["force"][()]
-
-
-def _draw_pair(axis: Axes, place: Array, history: h5py.Group, curves: Sequence[Curve]) -> None:
-    """Draw two curves on one panel, each on its own scale, both visible where they coincide."""
-    right = axis.twinx()
-    sides = zip((axis, right), curves, (("o-", BLUE), ("s:", ORANGE)), strict=True)
-    for side, (name, scale, label), (line, colour) in sides:
-        side.plot(place, scale * history[name][()], line, color=colour, fillstyle="none")
-        side.set_ylabel(label, color=colour)
-    right.grid(visible=False)
-    right.xaxis.set_visible(False)
 
 
 def _states(file: h5py.File) -> list[tuple[h5py.Group, Any]]:
@@ -252,6 +262,4 @@ def _change(file: h5py.File, name: str, scale: float, unit: str, what: str) -> s
     history = file["evolution"]
     cycles = history["cycles"][()]
     values = scale * history[name][()].reshape(len(cycles), -1)[:, 0]
-    after = f"{cycles[-1]:,.0f} cycles, {TO_JOULES * history['energy'][-1]:.4g} J"
-    before = f"{values[0]:.4g} {unit} unworn, " if values[0] else ""
-    return f"{what}: {before}{values[-1]:.4g} {unit} after {after}"
+    return f"{what} {course(values, unit)} in {times(round(cycles[-1]))} cycles"

@@ -28,8 +28,12 @@ from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE
 from workflow.shell.output.results import grid_of
 
 COLOURS = BLUE, ORANGE, GREEN
-PRESSURE, SHEAR = ("pressure", "p [MPa]", 1.0), ("shear", "qx [MPa]", 1.0)
-FIELDS = PRESSURE, SHEAR, ("slip", "slip x [µm]", TO_MICRONS)
+FIELDS = (
+    ("pressure", "pressure [MPa]", 1.0),
+    ("shear", "shear qx [MPa]", 1.0),
+    ("slip", "slip along x [µm]", TO_MICRONS),
+)
+LOADS = {"Qx": "tangential\nforce Qx", "Mz": "moment Mz"}
 # Moments below this share of P times the face's length are not shown.
 NOTHING = 1e-4
 
@@ -50,7 +54,7 @@ def half_space_and_structure(file: h5py.File, contents: WearContents) -> Figure:
         crosses = f"; crosses: {contents.loads}" if contents.structure else ""
         column[len(loads)].set_title(f"{interface}: along x{place}{crosses}")
     _cut(axes[len(loads) :, 0], file, contents)
-    labels = [f"{name} [{unit}{contents.per}]" for name, _, unit in loads]
+    labels = [f"{LOADS[name]} [{unit}{contents.per}]" for name, _, unit in loads]
     label_rows(axes, labels + [label for _, label, _ in FIELDS])
     legend_below(figure, [*axes[0], axes[len(loads), 0]], columns=3)
     return figure
@@ -152,4 +156,6 @@ def _largest_difference(file: h5py.File, contents: WearContents) -> str:
             half_space["Qx"][()] - structure["Qx"][()], half_space["Qy"][()] - structure["Qy"][()]
         )
         largest = max(largest, float((gap[limit > 0.0] / limit[limit > 0.0]).max(initial=0.0)))
-    return f"Half-space against {contents.loads}: Q differs by at most {percent(largest)} of µP"
+    text = percent(largest)
+    by = f"less than {text.lstrip('< ')}" if text.startswith("<") else f"up to {text}"
+    return f"Tangential forces on the half-space differ by {by} of µP from {contents.loads}"

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 
 from fe_models.meshes.structure_mesh import Body, Interface, StructureMesh
 from sa_solver.types import Array
-from workflow.pictures.panels import new_figure, widen
+from workflow.pictures.panels import legend_below, new_figure, widen
 from workflow.pictures.style import BLUE, COLOUR_MAP, ORANGE, write_figures
 
 COLOURS = BLUE, ORANGE
@@ -70,12 +70,12 @@ def _draw_areas(part: Any, interface: Interface, faces: list[Array], labels: lis
         Patch(color=colour, alpha=ALPHA, label=label)
         for colour, label in zip(COLOURS, labels, strict=True)
     ]
-    over.legend(handles=handles)
+    part.legend(handles=handles, loc="outside lower center", ncols=2)
     x, y = interface.coordinates.T
     apart = np.round(TO_MICRONS * interface.gap, DIGITS)
     colours = gap.tripcolor(x, y, interface.facets, apart, shading="gouraud", cmap=COLOUR_MAP)
     colours.set_clim(apart.min(), max(apart.max(), apart.min() + LEAST))
-    part.colorbar(colours, ax=gap, label="gap of the meshes [µm]", pad=0.01)
+    part.colorbar(colours, ax=gap, label="gap between the meshes [µm]", pad=0.01)
     for axis in (over, gap):
         axis.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     gap.set(xlim=over.get_xlim(), ylim=over.get_ylim())
@@ -92,4 +92,4 @@ def _draw_lines(part: Any, interface: Interface, faces: list[Array], labels: lis
         axis.plot(x, height, ".-", color=colour, ms=4.0, lw=1.2, label=label)
     widen(axis, LEAST)
     axis.set(xlabel="x [mm]", ylabel="height over the contact plane [µm]")
-    axis.legend()
+    legend_below(part, [axis])

@@ -17,8 +17,8 @@ from workflow.analyses.wear.output.layout import WearContents
 from workflow.analyses.wear.output.loop_table import SLIDES
 from workflow.pictures.panels import (
     blocks,
-    changes,
     label_rows,
+    largest_course,
     legend_below,
     new_figure,
     panel_rows,
@@ -37,16 +37,17 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK)
 def loops(file: h5py.File, contents: WearContents) -> Figure:
     """Draw loops at several numbers of cycles, and below them stiffness and energy over wear."""
     groups, per = file["loops"], contents.per
-    ends = {name: PER_MICRON * _column(group, "kt")[[0, -1]] for name, group in groups.items()}
+    ends = {name: list(PER_MICRON * _column(group, "kt")) for name, group in groups.items()}
+    title = f"The tangential stiffness {largest_course(ends, f'N/µm{per}')}"
     high = 5.0 * blocks(len(groups))
-    figure = new_figure(f"Tangential stiffness: {changes(ends, '.4g')} N/µm{per}", high + 4.5)
+    figure = new_figure(title, high + 4.5)
     parts = figure.subfigures(2, 1, squeeze=False, height_ratios=(high, 4.5))
     top, bottom = parts[:, 0]
     upper = panel_rows(top, 1, len(groups))
     for axis, (name, group) in zip(upper[0], groups.items(), strict=True):
         _draw_loops(axis, group)
-        axis.set(title=name, xlabel="displacement [µm]")
-    label_rows(upper, [f"force [N{per}]"])
+        axis.set(title=name, xlabel="tangential displacement [µm]")
+    label_rows(upper, [f"tangential force [N{per}]"])
     legend_below(top, upper.flat)
     _draw_evolution(bottom, groups, per)
     return figure
@@ -77,11 +78,12 @@ def _draw_evolution(figure: Any, groups: h5py.Group, per: str) -> None:
             values, errors = (scale * _column(group, column) for column in (key, f"{key}_error"))
             axis.errorbar(worn, values, errors, capsize=2.0, **look)
     for axis in panels:
-        axis.set_xlabel(f"energy dissipated so far [J{per}]")
+        axis.set_xlabel(f"dissipated energy [J{per}]")
         axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
-    stiffness.set(title="stuck stiffness", ylabel=f"kt [N/µm{per}]")
-    friction.set(title="friction" + ", only mobilised" * mobilised, ylabel="µ")
-    energy.set(title="energy per loop", ylabel=f"energy [mJ{per}]")
+    stiffness.set(title="stiffness while stuck", ylabel=f"stiffness kt [N/µm{per}]")
+    friction.set_title("friction" + ", only mobilised" * mobilised)
+    friction.set_ylabel("coefficient of friction µ")
+    energy.set(title="energy per loop", ylabel=f"dissipated energy [mJ{per}]")
     if len(groups) > 1:
         legend_below(figure, [stiffness])
 

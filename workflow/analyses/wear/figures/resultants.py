@@ -21,12 +21,13 @@ from workflow.pictures.panels import (
     legend_below,
     new_figure,
     panel_rows,
+    rounded,
     whole_ticks,
 )
-from workflow.pictures.style import BLUE, GREEN, HEADROOM, ORANGE
+from workflow.pictures.style import BLUE, GREEN, HEADROOM, ORANGE, PALE_BLUE, SHADE
 from workflow.shell.output.results import own
 
-NO_SLIDING = "no face slides as a whole"
+NO_SLIDING = "No face slides as a whole in any increment"
 # Largest number of ranges of sliding increments in a title.
 MOST_RANGES = 4
 # Sliding distance [mm] in a cycle whose energy counts as rounding.
@@ -40,7 +41,7 @@ def resultants(file: h5py.File, contents: WearContents) -> Figure:
     """
     names, per = contents.names, contents.per
     loads = {name: _history(file, name) for name in names}
-    title = f"Resultants over {_cycles_shown(file, contents)}: {_who_slides(loads)}"
+    title = f"{_who_slides(loads)} of {_cycles_shown(file, contents)}"
     largest = max(float(history["P"].max()) for history in loads.values())
     scale, unit = force_unit(largest)
     friction = {name: float(file[f"structure/{name}"].attrs["friction"]) for name in names}
@@ -60,8 +61,9 @@ def resultants(file: h5py.File, contents: WearContents) -> Figure:
             _draw_energy(axis, increments, *energies[name], contents)
         column[-1].set_xlabel("increment")
         whole_ticks(column[-1].xaxis)
+    labels = (f"normal force P [{unit}{per}]", f"tangential force Qx [{unit}{per}]")
     energy_label = f"energy per\nincrement [mJ{per}]"
-    label_rows(axes, (f"P [{unit}{per}]", f"Qx [{unit}{per}]", energy_label)[:rows])
+    label_rows(axes, (*labels, energy_label)[:rows])
     # A constant force must not coincide with the border.
     largest = max(axis.dataLim.y1 for axis in axes[0])
     axes[0, 0].set_ylim(0.0, HEADROOM * largest if largest > 0.0 else None)
@@ -101,7 +103,7 @@ def _cycles_shown(file: h5py.File, contents: WearContents) -> str:
 def _who_slides(loads: dict[str, dict[str, Array]]) -> str:
     """Return the share of sliding increments, for the title."""
     share = np.mean(np.concatenate([history["sliding"] for history in loads.values()]))
-    return f"faces slide as a whole in {percent(share)} of the increments" if share else NO_SLIDING
+    return f"Faces slide as a whole in {percent(share)} of the increments" if share else NO_SLIDING
 
 
 def _draw_normal_force(
@@ -109,7 +111,9 @@ def _draw_normal_force(
 ) -> None:
     axis.plot(increments, force, "o-", color=BLUE, markersize=4)
     peak = int(np.argmax(force))
-    axis.set_title(f"{interface}: P peaks at {force[peak]:.3g} {unit}, increment {peak + 1}")
+    axis.set_title(
+        f"{interface}: P peaks at {rounded(float(force[peak]))} {unit} in increment {peak + 1}"
+    )
 
 
 def _draw_tangential_force(
@@ -117,7 +121,7 @@ def _draw_tangential_force(
 ) -> None:
     limit, force = friction * forces["P"], forces["Qx"]
     label = f"|Qx| < µP, µ = {friction:g}"
-    axis.fill_between(increments, -limit, limit, color="#BBBBBB", alpha=0.5, lw=0, label=label)
+    axis.fill_between(increments, -limit, limit, color=SHADE, alpha=0.5, lw=0, label=label)
     axis.plot(increments, force, "-", color=GREEN)
     for mask, style, fill, name in (
         (~sliding, "o", "white", "at least partly stuck"),
@@ -126,11 +130,14 @@ def _draw_tangential_force(
         if mask.any():
             look: dict[str, Any] = {"color": GREEN, "mfc": fill, "ms": 6, "label": name}
             axis.plot(increments[mask], force[mask], style, **look)
-    axis.set_title(f"slides as a whole in increments {_ranges(increments[sliding])}")
+    which = _ranges(increments[sliding])
+    axis.set_title(
+        f"slides as a whole in increments {which}" if which else "partly stuck throughout"
+    )
 
 
 def _ranges(numbers: Iterable[Any]) -> str:
-    """Return numbers as ranges: ``1–3, 7`` for ``1, 2, 3, 7``; ``none`` if there are none.
+    """Return numbers as ranges: ``1–3, 7`` for ``1, 2, 3, 7``.
 
     If there are many ranges, only the first ones and the last are named.
     """
@@ -139,7 +146,7 @@ def _ranges(numbers: Iterable[Any]) -> str:
     texts = [f"{run[0]}–{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
     if len(texts) > MOST_RANGES:
         texts = [*texts[: MOST_RANGES - 1], "...", texts[-1]]
-    return ", ".join(texts) or "none"
+    return ", ".join(texts)
 
 
 def _draw_energy(
@@ -149,13 +156,13 @@ def _draw_energy(
     wears, loads, unit = contents.wears, contents.loads, f"mJ{contents.per}"
     after, against = float(wearing.sum()), ""
     if reference is not None:
-        axis.bar(increments, reference, width=0.8, color="#9DC3DE", label=loads)
+        axis.bar(increments, reference, width=0.8, color=PALE_BLUE, label=loads)
         before = float(reference.sum())
         difference = change(before, after, unit)
         against = (
             f", {difference} against {loads}"
             if difference.endswith("%")
-            else f", {loads} {before:.3g}"
+            else f", {loads} {rounded(before)}"
         )
     axis.plot(increments, wearing, "D", color=ORANGE, markersize=5, label=wears)
-    axis.set_title(f"energy over the cycle: {wears} {after:.4g} {unit}{against}")
+    axis.set_title(f"energy over the cycle: {wears} {rounded(after)} {unit}{against}")

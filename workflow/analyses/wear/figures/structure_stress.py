@@ -16,11 +16,12 @@ from workflow.analyses.wear.output.body_mesh import body_mesh
 from workflow.analyses.wear.output.layout import WearContents
 from workflow.models.stress.layout import MOMENTS
 from workflow.pictures.fields import scaled_panels
+from workflow.pictures.panels import course
 from workflow.pictures.style import BLACK
 from workflow.shell.output.results import grid_of
 
 STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
-CHANGE = "worn less unworn"
+CHANGE = "change by wear"
 
 # Offset of the section from the middle, relative to the body's diagonal.
 BESIDE = 1e-7
@@ -50,20 +51,23 @@ def structure_stress(file: h5py.File, contents: WearContents) -> Figure:
     low, high = _window(file)
     panels = {state: _sections(file, state) for state in _states(file)}
     ranges = {state: _range_within(low, high, cuts) for state, cuts in panels.items()}
-    top = max(ranges[state][1] for state in panels if state != CHANGE)
-    texts = (f"{ranges[state][1]:.0f} MPa {state}" for state in panels if state != CHANGE)
-    title = f"Von Mises stress {_place(file, contents)} at peak load: at most {', '.join(texts)}"
+    largest = [ranges[state][1] for state in panels if state != CHANGE]
+    where = _place(file, contents)
+    title = f"The largest von Mises stress {where} at peak load {course(largest, 'MPa')}"
     height = float(np.divide(*(high - low)[::-1]))
     figure, axes = scaled_panels(title, [height] * len(panels), 1)
     for axis, (state, sections) in zip(axes.flat, panels.items(), strict=True):
         least, most = ranges[state]
         signed = state == CHANGE
-        colours = _draw_sections(axis, sections, max(-least, most) if signed else top, signed)
+        colours = _draw_sections(
+            axis, sections, max(-least, most) if signed else max(largest), signed
+        )
         # The view shows the surroundings of the faces, where wear has an effect.
-        axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel=f"{'XYZ'[up]} [mm]")
-        axis.set_title(f"{state}: {least:+.0f} to {most:+.0f} MPa" if signed else state)
-        figure.colorbar(colours, ax=axis, label="[MPa]", pad=0.01)
-    axes[-1, 0].set_xlabel(f"{'XYZ'[right]} [mm]")
+        axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel=f"global {'XYZ'[up]} [mm]")
+        axis.set_title(f"{state}: {least:+.2g} to {most:+.2g} MPa" if signed else state)
+        label = "change of the stress [MPa]" if signed else "von Mises stress [MPa]"
+        figure.colorbar(colours, ax=axis, label=label, pad=0.01)
+    axes[-1, 0].set_xlabel(f"global {'XYZ'[right]} [mm]")
     return figure
 
 

@@ -27,11 +27,12 @@ from workflow.pictures.fields import (
 )
 from workflow.pictures.panels import (
     blocks,
-    changes,
     label_rows,
+    largest_course,
     legend_below,
     new_figure,
     panel_rows,
+    rounded,
 )
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, ORANGE
@@ -64,7 +65,7 @@ def subsurface_stress(file: h5py.File, contents: WearContents) -> Figure:
     # Stress outside a body is nan.
     largest = {name: np.nanmax(field, axis=(1, 2, 3)) for name, field in fields.items()}
     top = float(max(moments.max() for moments in largest.values()))
-    title = f"Von Mises stress under the contact at peak load: {changes(largest, '.0f', ' MPa')}"
+    title = f"The largest von Mises stress below the surface {largest_course(largest, 'MPa')}"
     windows = [_window(file, contents, name) for name in sections]
     heights = [len(strained) * depth / (high - low) for (low, high), depth in windows]
     flat = max(heights) <= FLAT and len(heights) <= 2
@@ -76,18 +77,18 @@ def subsurface_stress(file: h5py.File, contents: WearContents) -> Figure:
             of_bodies = dict(zip(strained, field, strict=True))
             colours = _draw_section(axis, group, of_bodies, top)
             _draw_yield(axis, group, of_bodies)
-            axis.set_title(f"{name}, {moment}: at most {np.nanmax(field):.0f} MPa")
+            axis.set_title(f"{name}, {moment}: at most {rounded(float(np.nanmax(field)))} MPa")
             down, up = (depth if body in strained else 0.0 for body in (1, 2))
             axis.set(xlim=(low, high), ylim=(-down, up), aspect="equal")
     along, other = ("y", "x") if group.attrs["axis"] == "y" else ("x", "y")
-    place = "" if contents.line else f", at {other} = {group.attrs['at']:.3g} mm"
+    place = "" if contents.line else f"; at {other} = {group.attrs['at']:.3g} mm"
     for axis in axes[-1]:
-        axis.set_xlabel(f"{along} [mm]{place}")
+        axis.set_xlabel(f"{along} [mm]")
     for axis in axes[:, 0]:
         axis.set_ylabel("z [mm]")
     whole = all(group.attrs["bulk_stress"] for group in sections.values())
     begins = TO_MICRONS * float(group["depths"][0])
-    figure.supxlabel(_whose_sections(contents, begins), fontsize="small")
+    figure.supxlabel(f"{_whose_sections(contents, begins)}{place}", fontsize="small")
     label = f"von Mises stress{'' if whole else ' of the contact alone'} [MPa]"
     colour_bar(figure, colours, axes, label)
     return figure
@@ -167,9 +168,9 @@ def fretting_life(file: h5py.File, contents: WearContents) -> Figure:
     parameter, symbol, unit = PARAMETERS[life["parameter"]]
     fields = {name: _values(group, parameter, contents.strained) for name, group in groups.items()}
     bodies = [contents.bodies[number - 1] for number in contents.strained]
-    largest = changes({name: field.max(axis=(0, 2, 3)) for name, field in fields.items()}, ".3g")
+    largest = {name: field.max(axis=(0, 2, 3)) for name, field in fields.items()}
     depth = TO_MICRONS * float(life["depth"])
-    title = f"{symbol} [{unit}] {depth:.3g} µm below the surface: {largest}"
+    title = f"{symbol} {depth:.3g} µm below the surface {largest_course(largest, unit)}"
     label = f"{symbol}{'' if life['bulk_stress'] else ' of the contact alone'} [{unit}]"
     endangered = np.any([of_bodies.any(axis=(1, 2, 3)) for of_bodies in fields.values()], axis=0)
     panels = {
@@ -189,12 +190,12 @@ Panels = dict[tuple[str, str], tuple[Grid, Array]]
 def _maps(title: str, label: str, panels: Panels) -> Figure:
     rows = [
         [
-            Map(f"{name}, {body}, {moment}: at most {field.max():.3g}", field, grid)
+            Map(f"{name}, {body}, {moment}: at most {rounded(float(field.max()))}", field, grid)
             for moment, field in zip(MOMENTS, moments, strict=True)
         ]
         for (name, body), (grid, moments) in panels.items()
     ]
-    return draw_maps(title, rows, label, "white: 0, or outside the contact")
+    return draw_maps(title, rows, label, "white: zero, or outside the contact")
 
 
 def _curves(title: str, label: str, panels: Panels) -> Figure:
@@ -207,7 +208,9 @@ def _curves(title: str, label: str, panels: Panels) -> Figure:
         axis = axes[bodies.index(body), names.index(name)]
         for moment, field, colour in zip(MOMENTS, moments, (BLUE, ORANGE), strict=True):
             axis.plot(centres(grid, 0), field[:, 0], color=colour, label=moment)
-        axis.set_title(f"{name}, {body}: at most {' → '.join(f'{m.max():.3g}' for m in moments)}")
+        axis.set_title(
+            f"{name}, {body}: at most {' → '.join(rounded(float(m.max())) for m in moments)}"
+        )
         spans.append(view_of(list(moments), grid, PROFILE_MARGIN).x)
     for axis in axes[-1]:
         axis.set_xlabel("x [mm]")

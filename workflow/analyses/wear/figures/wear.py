@@ -34,12 +34,14 @@ from workflow.pictures.panels import (
     Figures,
     blocks,
     change,
-    changes,
+    grouped_ticks,
     label_rows,
+    largest_course,
     legend_below,
     new_figure,
     panel_rows,
     present,
+    rounded,
     shaded,
     volume_unit,
 )
@@ -101,14 +103,18 @@ def pressure_maps(file: h5py.File, contents: WearContents) -> Figure:
                 for jump, field in fields.items()
             ]
         )
-    title = f"Largest pressure at peak load: {changes(peaks, '.0f', ' MPa')}"
-    note = f"white: open; arrow of the scale: the highest {100 - MAP_PERCENTILE:g}% of the cells"
+    title = f"The largest pressure at peak load {largest_course(peaks, 'MPa')}"
+    note = (
+        "white: no contact; the colours end below the highest pressures, in "
+        f"{100 - MAP_PERCENTILE:g}% of the cells"
+    )
     return draw_maps(title, rows, "pressure [MPa]", note)
 
 
 def _map_title(interface: str, cycles: str, field: Array, grid: Grid) -> str:
     closed = grid.cell_area * np.count_nonzero(field > 0.0)
-    return f"{interface}, {cycles}: at most {field.max():.0f} MPa, {closed:.3g} mm² in contact"
+    largest, area = rounded(float(field.max())), rounded(closed)
+    return f"{interface}, {cycles}: at most {largest} MPa, {area} mm² in contact"
 
 
 def _pressures(file: h5py.File, contents: WearContents, interface: str) -> dict[str, Array]:
@@ -139,7 +145,7 @@ def pressure_profiles(file: h5py.File, contents: WearContents) -> Figure:
         for direction, axis in enumerate(column):
             _draw_profile(axis, file, contents, name, direction)
             axis.set_title(f"{name}, {along[direction]}")
-    label_rows(axes, ["pressure [MPa]"] * len(along))
+    label_rows(axes, ["pressure at peak load [MPa]"] * len(along))
     for direction, axis in enumerate(axes[:, 0]):  # rows share it: only once all is drawn
         axis.set(xlim=_shown_span(file, contents, direction), ylim=(0.0, None))
     legend_below(figure, axes.flat, columns=2)
@@ -174,23 +180,22 @@ def _nodal_pressure(file: h5py.File, interface: str, direction: int) -> tuple[Ar
 
 
 def _edge_peak(file: h5py.File, contents: WearContents) -> str:
-    """Return the title: the pressure peak at y = 0 of the most loaded face, by every method."""
+    """Return the title: the pressure peak along x of the most loaded face, by every method."""
     unworn = contents.jump_names[0]
     peaks = {
         name: middle(file["contact"][name][unworn]["pressure"][()], 0).max()
         for name in contents.names
     }
     name = max(peaks, key=lambda name: peaks[name])
-    place = "" if contents.line else " at y = 0"
-    text = f"Pressure peak on {name}{place}: {peaks[name]:.0f} MPa"
+    by = {f"on {_cells(grid_of(file['grid'][name]))}": peaks[name]}
     if name in contents.coarse:
         coarse = file["contact"][name]["coarse"]
-        peak = middle(coarse["pressure"][()], 0).max()
-        cells = "" if contents.line else " cells"
-        text += f"; {_cells(grid_of(coarse))}{cells} see {peak:.0f} MPa"
+        by[f"on {_cells(grid_of(coarse))}"] = middle(coarse["pressure"][()], 0).max()
     if contents.structure:
-        text += f", finite elements {_nodal_pressure(file, name, 0)[1].max():.0f} MPa"
-    return text
+        by["by finite elements"] = _nodal_pressure(file, name, 0)[1].max()
+    texts = [f"{rounded(float(peak))} MPa {how}" for how, peak in by.items()]
+    place = f" on {name}" if len(contents.names) > 1 else ""
+    return f"Unworn peak pressure{place}: {', '.join(texts)}"
 
 
 # --- wear ---------------------------------------------------------------------------------------
@@ -205,19 +210,18 @@ def worn_profiles(file: h5py.File, contents: WearContents) -> Figure:
     for column, name in zip(axes.T, names, strict=True):
         deepest[name] = _draw_wear(column, file, contents, name)
         column[0].set_title(f"{name}: {upper} (above) and {lower} (below)")
-        column[1].set(title=f"{name}: depth worn off both bodies", xlabel="x [mm]")
+        column[1].set(title=f"{name}: worn depth of both bodies together", xlabel="x [mm]")
     place = "" if contents.line else " at y = 0"
-    texts = changes({name: [depth] for name, depth in deepest.items()}, ".3g", " µm")
-    figure.suptitle(f"Depth worn off{place}, at most: {texts}", fontweight="bold")
-    low, high = axes[0, 0].get_ylim()
     most = max(deepest.values())
+    figure.suptitle(f"Wear removes up to {rounded(most)} µm{place}", fontweight="bold")
+    low, high = axes[0, 0].get_ylim()
     if most:
         lowest = min(float(np.min(line.get_ydata())) for axis in axes[0] for line in axis.lines)
         low, high = max(low, lowest - BELOW * most), min(high, HEIGHT_IN_DEPTHS * most)
     axes[0, 0].set_ylim(low, high)
     axes[0, 0].set_xlim(_shown_span(file, contents, 0))
     axes[1, 0].invert_yaxis()
-    label_rows(axes, ("height [µm]", "wear depth [µm]"))
+    label_rows(axes, ("height of the surfaces [µm]", "worn depth, both bodies [µm]"))
     legend_below(figure, [axes[0, 0]])
     return figure
 
@@ -247,14 +251,12 @@ def kinetics(file: h5py.File, contents: WearContents) -> Figure:
     """Draw depth, volume and area over the cycles, with linear regimes and extrapolations."""
     groups = {name: file["kinetics"][name] for name in contents.names}
     cycles, per = file["kinetics/cycles"][()], contents.per
-    volumes = {
-        name: sum(group[f"volume_{body}"][-1] for body in (1, 2)) for name, group in groups.items()
-    }
-    scale, unit = volume_unit(max(volumes.values()))
-    totals = changes({name: [scale * v] for name, v in volumes.items()}, ".3g", f" {unit}{per}")
-    figure = new_figure(
-        f"Worn off in {cycles[-1]:,.0f} cycles: {totals}", 12.0 * blocks(len(groups))
-    )
+    volumes = [sum(group[f"volume_{body}"][-1] for body in (1, 2)) for group in groups.values()]
+    scale, unit = volume_unit(max(volumes))
+    total = f"{rounded(scale * sum(volumes))} {unit}{per}"
+    together = " from all contacts together" if len(volumes) > 1 else ""
+    title = f"Wear removes {total}{together} in {cycles[-1]:,.0f} cycles"
+    figure = new_figure(title, 12.0 * blocks(len(groups)))
     axes = panel_rows(figure, 3, len(groups))
     for column, (name, group) in zip(axes.T, groups.items(), strict=True):
         depth, volume, area = column
@@ -262,13 +264,15 @@ def kinetics(file: h5py.File, contents: WearContents) -> Figure:
         _draw_kinetics(depth, cycles, group, "depth", contents.bodies, TO_MICRONS)
         _draw_kinetics(volume, cycles, group, "volume", contents.bodies, scale)
         depth.set_title(f"{name}: largest depth, {_regime(group, cycles)}")
-        volume.set_title(f"{name}: volume, {_rate(group, per)}")
+        volume.set_title(f"{name}: worn volume, {_rate(group, per)}")
         area.set_xlabel("cycles")
-        area.xaxis.set_major_formatter("{x:,.0f}")
-        area.locator_params(axis="x", nbins=5)
+    for line in (axes[2, 0].xaxis, axes[1, 0].yaxis):
+        grouped_ticks(line)
     largest = max(group["area"][()].max() for group in groups.values())
     axes[2, 0].set_ylim(0.0, HEADROOM * largest)
-    label_rows(axes, ("largest depth [µm]", f"volume [{unit}{per}]", f"area [mm²{per}]"))
+    label_rows(
+        axes, ("largest depth [µm]", f"worn volume [{unit}{per}]", f"contact area [mm²{per}]")
+    )
     # Entries are collected from all panels, since not every one has a linear regime.
     legend_below(figure, axes.flat)
     return figure
@@ -287,7 +291,7 @@ def _draw_kinetics(
     for values, name, look in zip(worn, bodies, BODY_STYLES, strict=True):
         axis.plot(cycles, values, linestyle="", label=name, **look)
     total = worn[0] + worn[1]
-    axis.plot(cycles, total, "-", color=BLACK, label="both")
+    axis.plot(cycles, total, "-", color=BLACK, label="both bodies")
     linear_from = float(group.attrs[f"{quantity}_linear_from"])
     rate, trend, scatter = (
         scale * float(group.attrs[f"{quantity}_{name}"]) for name in ("rate", "trend", "scatter")
@@ -301,18 +305,21 @@ def _draw_kinetics(
 def _draw_extrapolation(axis: Axes, regime: LinearRegime) -> None:
     """Draw the line beyond the computed cycles, dashed, with its uncertainty band."""
     beyond = regime.last_cycles * np.array([1.0, EXTRAPOLATION])
-    label = "both, extrapolated (not computed)"
+    label = "extrapolated (not computed)"
     axis.plot(beyond, regime.extrapolate(beyond), "--", color=BLACK, label=label)
     fine = np.linspace(beyond[0], beyond[1], BAND_POINTS)
     line, reach = regime.extrapolate(fine), regime.uncertainty(fine)
-    look: dict[str, Any] = {"color": BLACK, "alpha": 0.2, "lw": 0, "label": "its uncertainty"}
-    axis.fill_between(fine, line - reach, line + reach, **look)
+    look: dict[str, Any] = {"color": BLACK, "alpha": 0.2, "lw": 0}
+    label = "uncertainty of the extrapolation"
+    axis.fill_between(fine, line - reach, line + reach, label=label, **look)
 
 
 def _draw_area(axis: Axes, cycles: Array, group: h5py.Group, interface: str, per: str) -> None:
     area = group["area"][()]
     axis.plot(cycles, area, "o-", color=PURPLE, markersize=4)
-    axis.set_title(f"{interface}: contact at peak load, {change(area[0], area[-1], f'mm²{per}')}")
+    axis.set_title(
+        f"{interface}: contact area at peak load, {change(area[0], area[-1], f'mm²{per}')}"
+    )
 
 
 def _rate(group: h5py.Group, per: str) -> str:
@@ -321,7 +328,7 @@ def _rate(group: h5py.Group, per: str) -> str:
     if not np.isfinite(rate):
         return "no linear regime, no extrapolation"
     scale, unit = volume_unit(rate)
-    return f"{scale * rate:.3g} {unit}{per} per 10⁶ cycles at the end"
+    return f"{rounded(scale * rate)} {unit}{per} per 10⁶ cycles at the end"
 
 
 def _regime(group: h5py.Group, cycles: Array) -> str:
@@ -348,4 +355,4 @@ def _cycles(file: h5py.File, interface: str, jump: str) -> str:
 
 def _cells(grid: Grid) -> str:
     """Return the grid's size in words."""
-    return f"{grid.shape[0]} cells" if grid.line else f"{grid.shape[0]} x {grid.shape[1]}"
+    return f"{grid.shape[0]} cells" if grid.line else f"{grid.shape[0]} x {grid.shape[1]} cells"
