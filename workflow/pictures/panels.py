@@ -35,6 +35,8 @@ TICKS = (2.0, 5.0)
 # Ratio of the ends of a logarithmic axis from which on only decades have numbers; ratio up to which
 # its numbers are those of a linear axis, and their count.
 MANY_DECADES, FEW_DECADES, FEW_TICKS = 100.0, 4.0, 5
+# Value from which on an axis has room for this many intervals between its numbers only.
+LONG_FROM, FEWEST_TICKS = 1e6, 3
 # A change is given in percent if the first value is at least this share of the last.
 NEARLY_ZERO = 1e-2
 # Values from the first size on are shown as whole numbers, up to the second size.
@@ -217,14 +219,14 @@ def plain_ticks(line: Axis) -> None:
 
 
 def grouped_ticks(line: Axis) -> None:
-    """Set a few numbers along an axis that may be long, grouped by thousands if it is."""
+    """Set a few numbers along an axis, grouped by thousands if they are large.
 
-    def text(x: float, _: float) -> str:
-        grouped = "," if np.abs(line.get_view_interval()).max() >= GROUPED else ""
-        return typeset(f"{x:{grouped}.10g}")
-
-    line.set_major_locator(MaxNLocator(FEW_TICKS))
-    line.set_major_formatter(text)
+    The limits of the axis must be set before.
+    """
+    largest = np.abs(line.get_view_interval()).max()
+    grouped = "," if largest >= GROUPED else ""
+    line.set_major_locator(MaxNLocator(FEW_TICKS if largest < LONG_FROM else FEWEST_TICKS))
+    line.set_major_formatter(lambda x, _: typeset(f"{x:{grouped}.10g}"))
 
 
 def whole_ticks(line: Axis) -> None:

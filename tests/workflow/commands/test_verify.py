@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from tests.marks import slow
+from tests.workflow.output.figure_checks import problems_of_run
 from workflow.cli import cli
 from workflow.kinds import load_case
 from workflow.runs import verify as verification
@@ -38,7 +39,9 @@ VERIFIED = (
 
 @pytest.mark.parametrize("name", [VERIFIED[0], *map(slow, VERIFIED[1:])])
 def test_shipped_cases_meet_their_expectations(name, tmp_path):
+    """The figures of their results are complete and legible too."""
     assert verification.verify_cases((CASES / f"{name}.yaml",), tmp_path)
+    assert problems_of_run(tmp_path / name) == []
 
 
 @pytest.mark.slow

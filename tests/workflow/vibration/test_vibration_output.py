@@ -13,6 +13,7 @@ import pyvista as pv
 
 from sa_solver.types import Array
 from tests.workflow.conftest import invoke, manifest_has_all
+from tests.workflow.output.figure_checks import problems_of_run
 from tests.workflow.output.shown_files import check_arrays, check_scene
 from tests.workflow.vibration.vibration_pad import LOAD, ROWS, places, run_block
 from wear.joints.periodic.march import SEPARATED, SLIP
@@ -142,9 +143,10 @@ def test_rising_branch_starts_where_the_motion_turns() -> None:
 # --- figures ------------------------------------------------------------------------------------
 
 
-def test_every_figure_is_written(folder: Path) -> None:
+def test_every_figure_is_written_and_legible(folder: Path) -> None:
     assert manifest_has_all(folder)
     assert {path.stem for path in (folder / "figures").iterdir()} == NAMES
+    assert problems_of_run(folder) == []
 
 
 def test_responses_are_drawn_per_force(results, summary):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import CASES
+from tests.workflow.output.figure_checks import problems_of_run
 from tests.workflow.vibration.time_scenes import run
 from workflow.errors import CaseError
 from workflow.kinds import parse_case
@@ -113,6 +114,7 @@ def test_responses_have_the_nodal_diameters_of_their_harmonics(tmp_path):
     # All sectors are looked at, of which each has two modes.
     assert response["unknown_points"] < response["points"]
     assert (tmp_path / "out" / "figures" / "nodal_diameters.png").exists()
+    assert problems_of_run(tmp_path / "out") == []
     with (tmp_path / "out" / "nodal_diameters.csv").open(encoding="utf-8") as file:
         assert [float(row["diameters [1]"]) for row in csv.DictReader(file)] == [0.0, 1.0, 2.0, 3.0]
 

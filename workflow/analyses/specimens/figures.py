@@ -138,9 +138,14 @@ def _loops_title(loads: list[h5py.Group]) -> str:
         _range([PER_MICRON * float(kept[place]["secant_stiffness"][()]) for kept in states])
         for place in (0, -1)
     )
-    return (
-        f"Loops rise with {unworn} N/µm unworn and {worn} N/µm worn, up to half the largest force"
-    )
+    return f"The slope of the loops up to half their force {_between(unworn, worn)}"
+
+
+def _between(unworn: str, worn: str) -> str:
+    """Say how stiffnesses [N/µm] change by wear."""
+    if unworn == worn:
+        return f"stays at {worn} N/µm"
+    return f"is {unworn} N/µm unworn and {worn} N/µm worn"
 
 
 def _range(values: list[float]) -> str:
@@ -180,7 +185,7 @@ def kinetics(file: h5py.File) -> Figure:
 def _kinetics_title(loads: list[h5py.Group]) -> str:
     stuck = [load["kinetics/stick_stiffness"][()] for load in loads]
     unworn, worn = (_range([PER_MICRON * float(k[place]) for k in stuck]) for place in (0, -1))
-    return f"The stiffness of the stuck pair is {unworn} N/µm unworn and {worn} N/µm worn"
+    return f"The stiffness of the stuck pair {_between(unworn, worn)}"
 
 
 def _label_kinetics(panels: Any) -> None:

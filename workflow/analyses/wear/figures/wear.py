@@ -104,11 +104,8 @@ def pressure_maps(file: h5py.File, contents: WearContents) -> Figure:
             ]
         )
     title = f"The largest pressure at peak load {largest_course(peaks, 'MPa')}"
-    note = (
-        "white: no contact; the colours end below the highest pressures, in "
-        f"{100 - MAP_PERCENTILE:g}% of the cells"
-    )
-    return draw_maps(title, rows, "pressure [MPa]", note)
+    beyond = f"the highest {100 - MAP_PERCENTILE:g}% of the cells are beyond the colour scale"
+    return draw_maps(title, rows, "pressure [MPa]", f"white: no contact; {beyond}")
 
 
 def _map_title(interface: str, cycles: str, field: Array, grid: Grid) -> str:
