@@ -449,13 +449,19 @@ class LoadHistory:
 
     def __post_init__(self) -> None:
         if not self.block.size and not self.share.size:
-            object.__setattr__(self, "share", np.ones(len(self.P)))
-            object.__setattr__(self, "block", np.zeros(len(self.P), dtype=np.int64))
+            count = len(checks.array("values of P", self.P, (None,), finite=False))
+            checks.settle(self, share=np.ones(count), block=np.zeros(count, dtype=np.int64))
         forces = [f.name for f in fields(self) if f.name not in ("sliding", "share", "block")]
         for name in (*forces, "share"):
             column = checks.array(f"values of {name}", getattr(self, name), (None,), finite=False)
             checks.settle(self, **{name: column})
-        checks.settle(self, sliding=np.asarray(self.sliding, dtype=bool))
+        sliding: Any = np.asarray(self.sliding)
+        if sliding.ndim != 1 or sliding.dtype.kind not in "biuf":
+            raise InputError(
+                f"LoadHistory.sliding is {checks.shown(self.sliding)}: give True or False for each "
+                "increment"
+            )
+        checks.settle(self, sliding=sliding.astype(bool))
         lengths = {len(getattr(self, f.name)) for f in fields(self)}
         if len(lengths) != 1:
             raise InputError(f"columns of a load history differ in length: {sorted(lengths)}")

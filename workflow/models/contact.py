@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from math import prod
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -29,6 +30,7 @@ from wear.steps.step_errors import ErrorControl, step_errors
 from wear.steps.steppers import ExplicitStepper, Stepper
 from wear.steps.stepping import WearingContact, WearState
 from wear.surfaces import Surfaces
+from workflow.models.checks.limits import MOST_CELLS, MOST_JUMPS, check_count
 from workflow.models.loads import ContactFace
 
 WearStepper = Stepper[WearState, WearingContact]
@@ -38,6 +40,7 @@ STEPS = "implicit", "second_order", "explicit"
 # A run with explicit steps, a fraction of their stability limit each, is recorded in this many
 # jumps: single steps are too short to record.
 RECORDS = 10
+LONGER_JUMPS = "give a longer jump, or none, so that an error estimate chooses it"
 # A larger tolerance of the contact solver would return its first guess.
 LARGEST_TOLERANCE = 1e-3
 
@@ -93,14 +96,22 @@ class Contact:
     tolerance: float = 1e-8
 
     def __post_init__(self) -> None:
-        checks.choice("method", self.method, ("normal", "full", "nodes"))
-        checks.choice("link", self.link, ("corrected", "half_space"))
-        checks.choice("gross_slip", self.gross_slip, ("force", "energies"))
+        checks.choices(
+            self,
+            method=("normal", "full", "nodes"),
+            link=("corrected", "half_space"),
+            gross_slip=("force", "energies"),
+        )
         checks.numbers(self, "tolerance", above=0.0, most=LARGEST_TOLERANCE)
-        if not _are_two(self.bodies, lambda body: isinstance(body, Material)):
-            raise InputError("bodies: give two, the Material of body 1 and that of body 2")
-        if not _are_two(self.laws, lambda law: hasattr(law, "depth_per_pressure")):
-            raise InputError("laws: give two, the wear law of body 1 and that of body 2")
+        if not _are_two(self.grid, lambda count: not isinstance(count, bool)):
+            raise InputError(
+                f"Contact.grid is {checks.shown(self.grid)}: give two numbers of cells, 1 along y "
+                "in a line contact"
+            )
+        cells = [checks.whole("a number of cells in Contact.grid", n, least=1) for n in self.grid]
+        check_count("cells", prod(cells), MOST_CELLS, "give Contact.grid fewer")
+        check_two_bodies(self.bodies)
+        check_two_laws(self.laws)
         if not isinstance(self.friction, CoulombFriction):
             checks.settle(self, friction=CoulombFriction(self.friction))
 
@@ -165,14 +176,13 @@ class Wear:
     motion: Literal["auto", "follow", "neglect"] = "auto"
 
     def __post_init__(self) -> None:
-        checks.choice("steps", self.steps, STEPS)
-        checks.choice("motion", self.motion, MOTIONS)
+        checks.choices(self, steps=STEPS, motion=MOTIONS, resultants=("drift", "constant", "every"))
         checks.numbers(self, "cycles", above=0.0)
         checks.numbers(self, "tolerance", "depth_tolerance", "fraction", above=0.0)
-        if not isinstance(self.jump, JumpSize) or not isinstance(self.stop, Stop):
-            raise InputError(
-                f"jump is {self.jump!r} and stop {self.stop!r}: give a JumpSize and a Stop"
-            )
+        checks.numbers(self, "drift", least=0.0)
+        checks.instances(self, jump=JumpSize, stop=Stop)
+        if self.jump.cycles is not None:
+            check_count("wear jumps", self.cycles / self.jump.cycles, MOST_JUMPS, LONGER_JUMPS)
         if self.fraction is not None and (self.steps != "explicit" or self.jump != JumpSize()):
             raise InputError(
                 "fraction is the length of explicit steps: give it with steps explicit and "
@@ -206,8 +216,25 @@ class Wear:
         )
 
 
+def check_two_bodies(bodies: object) -> None:
+    """Raise InputError unless ``bodies`` are two materials."""
+    if not _are_two(bodies, lambda body: isinstance(body, Material)):
+        raise InputError(
+            f"bodies are {checks.shown(bodies)}: give two, the Material of body 1 and that of "
+            "body 2"
+        )
+
+
+def check_two_laws(laws: object) -> None:
+    """Raise InputError unless ``laws`` are two wear laws."""
+    if not _are_two(laws, lambda law: hasattr(law, "depth_per_pressure")):
+        raise InputError(
+            f"laws are {checks.shown(laws)}: give two, the wear law of body 1 and that of body 2"
+        )
+
+
 def _are_two(values: object, fits: Callable[[object], bool]) -> bool:
-    """Return whether ``values`` are two, one for each body, and both fit."""
+    """Return whether ``values`` are two, one for each body or axis, and both fit."""
     return isinstance(values, tuple | list) and len(values) == 2 and all(map(fits, values))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
+from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -62,8 +63,15 @@ class DovetailMesh:
     order: Literal[1, 2] = 1
 
     def __post_init__(self) -> None:
-        if self.order not in (1, 2):
-            raise InputError(f"order is {self.order!r}: give 1 or 2")
+        checks.wholes(self, "order", least=1, most=2)
+        checks.wholes(self, "notch", least=3)
+        checks.numbers(self, "size", above=0.0)
+        checks.members(self, flank_nodes=int | np.integer)
+        if len(self.flank_nodes) != 2 or min(self.flank_nodes) < FEWEST_NODES:
+            raise InputError(
+                f"DovetailMesh.flank_nodes is {self.flank_nodes}: give two numbers of nodes, "
+                f"{FEWEST_NODES} or more across a flank and along the slot"
+            )
 
     def refined(self, factor: float) -> DovetailMesh:
         """Return the mesh with elements that are finer by ``factor``; its notches stay the same."""
@@ -133,6 +141,18 @@ class DovetailJoint:
     )
 
     def __post_init__(self) -> None:
+        checks.instances(
+            self,
+            geometry=Dovetail,
+            disk=Material,
+            blade=Material,
+            mesh=DovetailMesh,
+            added=Mapping,
+            nonlinearity=Nonlinearity,
+            finer=str,
+        )
+        checks.members(self, missions=Mission, shares=Real, added=AddedGap)
+        checks.wholes(self, "dimension", least=2, most=3)
         if len(self.missions) != len(self.shares) or not self.missions:
             raise InputError(
                 f"{len(self.missions)} missions and {len(self.shares)} shares: give as many of "
@@ -140,7 +160,7 @@ class DovetailJoint:
             )
         if min(self.shares) < 0.0 or not np.isclose(sum(self.shares), 1.0):
             raise InputError(f"shares {self.shares}: give 0 or more, which add up to 1")
-        checks.choice("sides", self.sides, ("guided", "cyclic"))
+        checks.choices(self, sides=("guided", "cyclic"))
         if unknown := self.added.keys() - SIDES.keys():
             raise InputError(f"no flank called {', '.join(unknown)}: give intrados or extrados")
 

@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from fe_models.solvers.blas_threads import one_thread
+from sa_solver import checks
 from sa_solver.errors import InputError
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceContact
 from wear.coupled import CoupledWear
-from wear.coupled_state import CoupledState, Observer, observed
+from wear.coupled_state import CoupledState, Observer, check_observers, observed
 from wear.schedule import CoupledSettings
 from wear.steps.steppers import ROUNDING
 from workflow.errors import ModelWarning
+from workflow.models.checks.limits import check_explicit_steps, check_jumps
+from workflow.models.checks.start import check_origin, origin_of
 from workflow.models.contact import (
     Contact,
     FaceContact,
@@ -84,12 +87,15 @@ class WearModel:
     stress: Stress | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.contacts, Contact | Mapping):
-            raise InputError("contacts: give a Contact, or one for each face by its name")
-        if not isinstance(self.wear, Wear):
-            raise InputError(f"wear is {self.wear!r}: give a Wear, such as Wear(cycles=1e5)")
-        if not isinstance(self.stress, Stress | None):
-            raise InputError(f"stress is {self.stress!r}: give a Stress, or None")
+        # Structures of finite elements, pairs of bodies, and other sources of loads.
+        if not any(hasattr(self.structure, name) for name in ("meshed", "source", "unworn")):
+            raise InputError(
+                f"WearModel.structure is {checks.shown(self.structure)}: give a structure of "
+                "finite elements, a BodyPair, or a source of loads such as GivenLoads"
+            )
+        checks.instances(self, contacts=Contact | Mapping, wear=Wear, stress=Stress | None)
+        if isinstance(self.contacts, Mapping):
+            checks.members(self, contacts=Contact)
 
     def contact(self, name: str) -> Contact:
         """Return the contact of a face. Raises InputError where the model has none."""
@@ -189,8 +195,7 @@ class WearModel:
         MethodFailed, ContactFailure
             A solver did not converge.
         """
-        if not isinstance(observers, Sequence):
-            raise InputError("observers: give a list of them, even of one")
+        check_observers(observers)
         loads = self.loads(store)
         loads.prepare()
         # The matrices of contacts and increments are small: threads would only cost time.
@@ -203,6 +208,9 @@ class WearModel:
             recorder = ResultsRecorder(contacts, loads.peak)
             loop = self.loop(loads, contacts, [*observers, recorder])
             state, first = self.begin(loop, unworn, start)
+            check_jumps(self.settings(loads), state)
+            stable = [found.stable_cycles for found in first]
+            check_explicit_steps(self.wear.cycles, self.wear.fraction, stable)
             for message in _warnings(loads, contacts, first):
                 warnings.warn(message, ModelWarning, stacklevel=2)
             end, found = loop.run(state), None
@@ -221,9 +229,18 @@ class WearModel:
         Raises InputError unless ``start`` is a state of this model before its last cycle.
         """
         state, first = loop.begin(unworn)
+        names = [face.face.name for face in cast("LoadSource", loop.source).faces]
+        of_faces = {name: self.contact(name) for name in names}
+        origin = origin_of(of_faces, self.wear, self.structure, unworn)
+        state = replace(state, origin=origin)
         if start is None:
             return state, first
-        _check_start(start, state)
+        if not isinstance(start, CoupledState):
+            raise InputError(
+                f"start is {checks.shown(start)}: give a state, such as that of a Checkpoint"
+            )
+        check_origin(start.origin, origin)
+        _check_surfaces(start, state)
         if start.cycles[-1] > self.wear.cycles * (1.0 + ROUNDING):
             raise InputError(
                 f"the state to start from has {start.cycles[-1]:g} cycles, the model "
@@ -273,17 +290,13 @@ def _warnings(
         yield from few_cells_warnings(contacts.stages, first, loads.peak)
 
 
-def _check_start(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:
-    """Raise InputError unless the state to start from fits the model of an ``unworn`` one.
+def _check_surfaces(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:
+    """Raise InputError unless a state has the gaps of ``unworn`` faces: functions have no digest.
 
-    Faces and their gaps must be the same, and the loads too where wear has not changed them yet.
+    Functions count by their names in the digests of a model.
     """
     pairs = zip(start.interfaces, unworn.interfaces, strict=False)
     if len(start.interfaces) != len(unworn.interfaces) or not all(
         np.array_equal(one.surfaces.initial_gap, other.surfaces.initial_gap) for one, other in pairs
     ):
-        raise InputError("the state to start from is of another model: its faces differ")
-    if start.solutions == 1 and not np.array_equal(
-        start.solved_resultants, unworn.solved_resultants
-    ):
-        raise InputError("the state to start from is of another model: its loads differ")
+        raise InputError("the state to start from is of another model: its gaps differ")

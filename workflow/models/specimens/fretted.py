@@ -14,12 +14,13 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array, unseen
-from wear.coupled_state import Observer
+from wear.coupled_state import Observer, check_observers
 from wear.laws import WearLaw
 from wear.steps.marching import rest
 from wear.steps.steppers import ExplicitStepper
 from workflow.errors import MethodFailed, UserError
 from workflow.layout.declared import declared
+from workflow.models.contact import check_two_laws
 from workflow.models.specimens.reduced import ReducedSpecimens, SpecimenPair
 from workflow.models.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
 from workflow.models.structure_model import StructureStore
@@ -100,6 +101,8 @@ class FrettedSpecimens:
     block: float | None = None
 
     def __post_init__(self) -> None:
+        checks.instances(self, specimens=SpecimenPair, conditions=FrettingConditions)
+        check_two_laws(self.laws)
         checks.numbers(self, "cycles", "energy", "block", above=0.0)
         checks.numbers(self, "fraction", above=0.0, most=1.0)
         if self.specimens.target_distance is not None:
@@ -136,6 +139,7 @@ class FrettedSpecimens:
         UserError
             The run would not come to an end.
         """
+        check_observers(observers)
         pair = self.specimens
         reduced = pair.reduced if store is None else ReducedSpecimens(pair, store)
         reduced.prepare(unseen)

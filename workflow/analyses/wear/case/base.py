@@ -27,6 +27,7 @@ from workflow.case.fields import shown
 from workflow.case.plausibility import idle_steps, uneven_cells
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 from workflow.case.text.plain import entries, of_bodies, plain, shares, times
+from workflow.models.checks.names import is_group_name
 
 # Names of the entries of summary and results, which interfaces must not have.
 RESERVED = (
@@ -40,9 +41,9 @@ EXPECTED_INCREMENTS, MOST_INCREMENTS = 11, 1000
 
 def check_interface_name(name: str, key: str) -> None:
     """Refuse, at ``key``, an interface whose name cannot be used in the results."""
-    if name in RESERVED or "/" in name:
+    if name in RESERVED or not is_group_name(name):
         raise disagreement(
-            f"an interface called {shown(name)}; allowed: names without /, other than "
+            f"an interface called {shown(name)}; allowed: a name without /, other than "
             f"{', '.join(RESERVED)}",
             key,
         )
