@@ -225,7 +225,7 @@ class Duration(Section):
         least = self.cycles / MOST_JUMPS
         if self.step.cycles is not None and self.step.cycles < least:
             raise disagreement(
-                f"{self.step.cycles:g} cycles: {self.cycles / self.step.cycles:.3g} jumps; "
+                f"{self.step.cycles:g}: {self.cycles / self.step.cycles:.3g} jumps; "
                 f"allowed: {least:g} cycles or more, which makes {MOST_JUMPS} jumps",
                 "step.cycles",
                 "cycles",
