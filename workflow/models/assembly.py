@@ -22,7 +22,7 @@ from fe_models.imported_structure import (
     imported_softening,
     imported_structure,
 )
-from fe_models.loads.applied_loads import AppliedLoad, Rotation
+from fe_models.loads.applied_loads import Acceleration, AppliedLoad, Rotation
 from fe_models.loads.pretension import Bolt, Pretension, bolt_section
 from fe_models.meshes.curved_face import Surface
 from fe_models.meshes.cut_face import whole_face
@@ -35,6 +35,7 @@ from sa_solver.surfaces.shapes import PARTING_SLOPE
 from sa_solver.types import Array, Indices, Material
 from workflow.models.checks.limits import MOST_INCREMENTS
 from workflow.models.checks.names import check_face_name
+from workflow.models.checks.warnings import weightless_warnings
 from workflow.models.faces import face_size, planes_of_symmetry
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
@@ -310,7 +311,13 @@ class MeshAssembly:
         return FinerMesh(replace(self, order=2, joined=None))
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
-        """Return the unit of the mesh, and contacts that supports or planes of symmetry cut."""
+        """Return the unit of the mesh, bodies without mass, and contacts that are cut.
+
+        Supports or planes of symmetry cut contacts.
+        """
+        if any(isinstance(load, Rotation | Acceleration) for load in self.loads):
+            for text in weightless_warnings(self.bodies):
+                yield Remark(text)
         unit = self.imported.unit
         if unit.size != 1.0:
             yield Remark(

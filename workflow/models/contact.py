@@ -14,7 +14,7 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
-from sa_solver.surfaces.resolution import fewest_across, peak_error, too_few_across
+from sa_solver.surfaces.resolution import fewest_across, is_point, peak_error, too_few_across
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
@@ -183,6 +183,11 @@ class Wear:
         checks.instances(self, jump=JumpSize, stop=Stop)
         if self.jump.cycles is not None:
             check_count("wear jumps", self.cycles / self.jump.cycles, MOST_JUMPS, LONGER_JUMPS)
+        if self.steps == "explicit" and self.automatic:
+            raise InputError(
+                "Wear.steps: explicit steps have no error estimate that chooses their length: give "
+                "jump or fraction"
+            )
         if self.fraction is not None and (self.steps != "explicit" or self.jump != JumpSize()):
             raise InputError(
                 "fraction is the length of explicit steps: give it with steps explicit and "
@@ -363,16 +368,27 @@ WornFaces = Sequence[tuple[FaceContact, FaceState]]
 
 
 def few_cells_warnings(
-    stages: Sequence[FaceContact], first: Sequence[FirstContact], peak: int
+    stages: Sequence[FaceContact], pressures: Sequence[Array], worn: bool = False
 ) -> Iterator[str]:
-    """Yield the warnings for contacts that cover too few cells at the ``peak`` load, unworn."""
-    for stage, found in zip(stages, first, strict=True):
-        if across := too_few_across(found.pressure[peak] > 0.0, stage.grid.line):
-            yield (
+    """Yield the warnings for contacts that cover too few cells at peak load.
+
+    ``pressures`` ``(nx, ny)`` [MPa] are those of each contact, unworn or ``worn``. Raises
+    InputError for an unworn contact that is a single point on its grid.
+    """
+    after = " after wear" if worn else ""
+    for stage, pressure in zip(stages, pressures, strict=True):
+        if not (across := too_few_across(pressure > 0.0, stage.grid.line)):
+            continue
+        if is_point(pressure > 0.0) and not worn:
+            raise InputError(
                 f"{stage.name}: the contact is only {' x '.join(map(str, across))} cells across, "
-                f"and {fewest_across(stage.grid.line)} are needed: the largest pressure may have "
-                f"an error of {100.0 * peak_error(min(across)):.1f} %: give it a finer grid"
+                "so that its size and pressure are meaningless: give it a finer grid"
             )
+        yield (
+            f"{stage.name}: the contact is only {' x '.join(map(str, across))} cells across"
+            f"{after}, and {fewest_across(stage.grid.line)} are needed: the largest pressure may "
+            f"have an error of {100.0 * peak_error(min(across)):.1f} %: give it a finer grid"
+        )
 
 
 def border_warnings(stages: Sequence[FaceContact], first: Sequence[FirstContact]) -> Iterator[str]:

@@ -20,6 +20,7 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Material
 from workflow.models.budget.convergence import MESH_ORDER, share_of_difference
+from workflow.models.checks.warnings import weightless_warnings
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
 from workflow.models.structure_model import FinerMesh, LoadCycle, Nonlinearity, Remark
@@ -255,6 +256,8 @@ class DovetailJoint:
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
         """Yield remarks: sides that a moment would move, and a joint that locks itself."""
+        for text in weightless_warnings({"the disk": self.disk, "the blade": self.blade}):
+            yield Remark(text)
         moments = any(mission.aerodynamic_moment for mission in self.missions)
         if moments and self.sides == "guided" and self.geometry.skew == 0.0:
             yield Remark(

@@ -21,6 +21,14 @@ from wear.steps.steppers import ROUNDING
 from workflow.errors import ModelWarning
 from workflow.models.checks.limits import check_explicit_steps, check_jumps
 from workflow.models.checks.start import check_origin, origin_of
+from workflow.models.checks.warnings import (
+    dissimilar_warning,
+    friction_warnings,
+    growth_warnings,
+    instability_warning,
+    link_warning,
+    yield_warning,
+)
 from workflow.models.contact import (
     Contact,
     FaceContact,
@@ -185,8 +193,10 @@ class WearModel:
         Warns
         -----
         ModelWarning
-            A contact touches the border of its grid, or covers too few cells; the structure has
-            an obvious fault, or its stress is not fully known.
+            A contact touches the border of its grid, covers too few cells, yields, or is of
+            dissimilar bodies whose coupling ``method`` "normal" neglects; explicit steps are
+            unstable; friction is unusual; the structure has an obvious fault, or its stress is not
+            fully known.
 
         Raises
         ------
@@ -206,7 +216,10 @@ class WearModel:
                 for stage in contacts.stages:
                     self.stress.check(stage.grid)
             recorder = ResultsRecorder(contacts, loads.peak)
-            loop = self.loop(loads, contacts, [*observers, recorder])
+            watching = [*observers, recorder]
+            if self.wear.steps == "explicit" and self.wear.fraction is None:
+                watching.append(StabilityWatch(contacts))
+            loop = self.loop(loads, contacts, watching)
             state, first = self.begin(loop, unworn, start)
             check_jumps(self.settings(loads), state)
             stable = [found.stable_cycles for found in first]
@@ -214,6 +227,8 @@ class WearModel:
             for message in _warnings(loads, contacts, first):
                 warnings.warn(message, ModelWarning, stacklevel=2)
             end, found = loop.run(state), None
+            for message in _end_warnings(contacts, end, recorder):
+                warnings.warn(message, ModelWarning, stacklevel=2)
             if self.stress is not None:
                 with observed(observers, "stress"):
                     found = self._stress(self.stress, loads, contacts.faces(end), unworn, first)
@@ -283,11 +298,47 @@ def _warnings(
     loads: LoadSource, contacts: FaceContacts, first: Sequence[FirstContact]
 ) -> Iterator[str]:
     """Return what makes results wrong though all solvers converge."""
+    stages = contacts.stages
     if isinstance(loads, StructureLoads):
         yield from (remark.text for remark in loads.remarks() if remark.is_warning)
-    yield from border_warnings(contacts.stages, first)
-    if all(isinstance(stage.contact, InterfaceContact) for stage in contacts.stages):
-        yield from few_cells_warnings(contacts.stages, first, loads.peak)
+    yield from friction_warnings(stages)
+    yield from border_warnings(stages, first)
+    if _half_spaces(contacts):
+        yield from few_cells_warnings(stages, [contact.pressure[loads.peak] for contact in first])
+    found = [dissimilar_warning(stages, first)]
+    for stage, contact in zip(stages, first, strict=True):
+        found += [link_warning(stage.name, contact.link), yield_warning(stage, contact)]
+    yield from filter(None, found)
+
+
+def _end_warnings(
+    contacts: FaceContacts, end: CoupledState[Any], recorder: ResultsRecorder
+) -> Iterator[str]:
+    """Return what makes the worn surfaces at the end of a run wrong."""
+    if _half_spaces(contacts):
+        yield from growth_warnings(contacts.faces(end))
+        pressures = [fields.pressure for fields in recorder.fields[-1]]
+        yield from few_cells_warnings(contacts.stages, pressures, worn=True)
+
+
+def _half_spaces(contacts: FaceContacts) -> bool:
+    """Return whether the contacts are half-spaces, and not nodes that the grid only shows."""
+    return all(isinstance(stage.contact, InterfaceContact) for stage in contacts.stages)
+
+
+@dataclass
+class StabilityWatch(Observer):
+    """Observer that warns once of explicit steps beyond their stability limit."""
+
+    contacts: FaceContacts
+    warned: bool = False
+
+    def jump_started(self, state: CoupledState[Any], cycles: float) -> None:
+        if self.warned or not _half_spaces(self.contacts):
+            return
+        if message := instability_warning(self.contacts.faces(state), cycles):
+            self.warned = True
+            warnings.warn(message, ModelWarning, stacklevel=2)
 
 
 def _check_surfaces(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:

@@ -19,6 +19,12 @@ from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
+from workflow.models.checks.warnings import (
+    dissimilar_warning,
+    growth_warnings,
+    instability_warning,
+    yield_warning,
+)
 from workflow.models.contact import FaceContact, WornFaces, border_warnings
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
@@ -147,28 +153,15 @@ def warn_of_contact(
     Raises UserError if a contact has too few cells.
     """
     stages = [stage for stage, _ in faces]
-    unlike = [stage.pair for stage in stages if not stage.pair.similar]
-    if case.contact.method == "normal" and unlike:
-        pair = max(unlike, key=lambda pair: abs(pair.dundurs_beta))
-        linked = all(result.link.corrects for result in first)
-        has = "resolves only as far as the mesh does" if linked else "neglects"
-        reporter.warn(
-            f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}), so shear moves the "
-            f"surfaces normally, which contact.method: normal {has}: use full"
-        )
+    if warning := dissimilar_warning(stages, first):
+        reporter.warn(warning)
     for line in border_warnings(stages, first):
         reporter.warn(line)
     for (stage, state), result in zip(faces, first, strict=True):
-        terms = case.terms(stage.name)
-        yield_stress = min(material.yield_stress for material in terms.materials)
         if case.contact.method != "nodes":
             report_link(stage.name, result.link, stage.grid.line, reporter)
-        highest = result.pressure.max()
-        if highest > yield_stress:
-            reporter.warn(
-                f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
-                f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
-            )
+        if warning := yield_warning(stage, result):
+            reporter.warn(warning)
         if case.contact.method == "nodes":
             continue  # the grid only shows them
         if warning := _energies_differ(source, stage, state.loads, result):
@@ -220,20 +213,14 @@ def _work_of_sliding(stage: FaceContact, loads: LoadHistory) -> float:
 
 def warn_of_instability(faces: WornFaces, cycles: float, reporter: Reporter) -> None:
     """Warn of explicit steps with more cycles than is stable."""
-    stable = min(stage.contact.stable_cycles(state) for stage, state in faces)
-    if cycles > stable:
-        reporter.warn(
-            f"explicit wear steps above {stable:.3g} cycles amplify the roughness of the grid: "
-            "use implicit or smaller steps (wear.step)"
-        )
+    if warning := instability_warning(faces, cycles):
+        reporter.warn(warning)
 
 
 def warn_of_growth(faces: WornFaces, reporter: Reporter) -> None:
     """Warn of half-space contacts that have worn up to the border of their grid."""
-    for stage, state in faces:
-        worn = state.surfaces.depth
-        if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
-            reporter.warn(stage.border_warning)
+    for warning in growth_warnings(faces):
+        reporter.warn(warning)
 
 
 def warn_of_many_jumps(

@@ -1,0 +1,107 @@
+"""Warnings about results that may be wrong though all solvers converge, for models and cases.
+
+Each function has one judgement. Models warn of them as :class:`workflow.errors.ModelWarning`, and
+runs of cases in their log and report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from sa_solver.types import Material
+from wear.contact.interface import FirstContact, InterfaceContact
+from wear.contact.link import StructureLink
+from workflow.models.contact import FaceContact, WornFaces
+
+USUAL_FRICTION = 0.02, 1.2
+"""Usual coefficients of friction: lubricated surfaces to clean metals."""
+
+
+def friction_warnings(stages: Sequence[FaceContact]) -> Iterator[str]:
+    """Yield the warnings for contacts whose coefficient of friction is unusual."""
+    low, high = USUAL_FRICTION
+    for stage in stages:
+        friction = stage.settings.friction(0.0)
+        if friction > 0.0 and not low <= friction <= high:
+            yield (
+                f"{stage.name}: the coefficient of friction is {friction:g}; usual: {low:g} to "
+                f"{high:g}"
+            )
+
+
+def dissimilar_warning(stages: Sequence[FaceContact], first: Sequence[FirstContact]) -> str:
+    """Return the warning for slips of the loads on dissimilar bodies; empty if all are similar."""
+    unlike = [
+        stage.pair
+        for stage in stages
+        if isinstance(stage.contact, InterfaceContact)
+        and stage.settings.method == "normal"
+        and not stage.pair.similar
+    ]
+    if not unlike:
+        return ""
+    pair = max(unlike, key=lambda pair: abs(pair.dundurs_beta))
+    linked = all(found.link.corrects for found in first)
+    has = "resolves only as far as the mesh does" if linked else "neglects"
+    return (
+        f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}), so shear moves the "
+        f"surfaces normally, which method normal of the contact {has}: use full"
+    )
+
+
+def yield_warning(stage: FaceContact, first: FirstContact) -> str:
+    """Return the warning for a pressure above the yield stress; empty for a lower one."""
+    highest = float(first.pressure.max())
+    limit = min(body.yield_stress for body in (stage.pair.body_1, stage.pair.body_2))
+    if highest <= limit:
+        return ""
+    return (
+        f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
+        f"{limit:.0f} MPa: the elastic solution is no longer valid there"
+    )
+
+
+def link_warning(name: str, link: StructureLink) -> str:
+    """Return the warning for an uncertain link of a contact to its structure; else empty."""
+    if not link.corrects or not link.coarse:
+        return ""
+    _, misfit, graininess = link.quality.tolist()
+    why = (
+        "the mesh is too coarse"
+        if link.grainy
+        else "the deformation changes within fewer nodes than a fit can follow"
+    )
+    return (
+        f"{name}: the link to the structure has errors of {100.0 * misfit:.2g} % (smooth) and "
+        f"{100.0 * graininess:.2g} % (grainy) of the deformation of half-spaces, and pressures may "
+        f"be wrong by as much: {why}; refine the mesh of the contact face"
+    )
+
+
+def instability_warning(faces: WornFaces, cycles: float) -> str:
+    """Return the warning for explicit steps of more ``cycles`` than is stable; else empty."""
+    stable = min(stage.contact.stable_cycles(state) for stage, state in faces)
+    if cycles <= stable:
+        return ""
+    return (
+        f"explicit wear steps above {stable:.3g} cycles amplify the roughness of the grid: use "
+        "implicit or smaller steps"
+    )
+
+
+def growth_warnings(faces: WornFaces) -> Iterator[str]:
+    """Yield the warnings for half-space contacts that have worn up to the border of their grid."""
+    for stage, state in faces:
+        worn = state.surfaces.depth
+        if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
+            yield stage.border_warning
+
+
+def weightless_warnings(bodies: Mapping[str, Material]) -> Iterator[str]:
+    """Yield the warnings for ``bodies`` without density that rotation or acceleration loads."""
+    for name, material in bodies.items():
+        if material.density == 0.0:
+            yield (
+                f"{name} has no density, so the forces of its own mass under rotation or "
+                "acceleration are missing: give its material one"
+            )
