@@ -134,7 +134,7 @@ def test_stress_under_a_contact_balances_its_loads(model):
 
 def test_a_section_beside_the_grid_is_refused(model):
     for wrong in (fretscale.Stress(at=2.0), fretscale.Stress("y")):
-        with pytest.raises(InputError, match=r"stress\."):
+        with pytest.raises(InputError, match="contact"):
             replace(model, stress=wrong).run()
     with pytest.raises(InputError, match="depth"):
         fretscale.Stress(depth=0.01)

@@ -122,7 +122,7 @@ class Passage:
             if beyond > 0:
                 raise TravelError(
                     f"the stroke carries wear {beyond} cells beyond the end of the grid along "
-                    f"{name}: make the grid (contact.size) longer by "
+                    f"{name}: make its size larger by "
                     f"{2 * beyond * self.grid.pitch[axis]:.3g} mm or more"
                 )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import prod
 from typing import Any, Literal, Protocol
@@ -103,13 +104,14 @@ class Contact:
             gross_slip=("force", "energies"),
         )
         checks.numbers(self, "tolerance", above=0.0, most=LARGEST_TOLERANCE)
-        if not _are_two(self.grid, lambda count: not isinstance(count, bool)):
+        if np.shape(self.grid) != (2,):
             raise InputError(
                 f"Contact.grid is {checks.shown(self.grid)}: give two numbers of cells, 1 along y "
                 "in a line contact"
             )
         cells = [checks.whole("a number of cells in Contact.grid", n, least=1) for n in self.grid]
         check_count("cells", prod(cells), MOST_CELLS, "give Contact.grid fewer")
+        checks.settle(self, grid=tuple(cells))
         check_two_bodies(self.bodies)
         check_two_laws(self.laws)
         if not isinstance(self.friction, CoulombFriction):
@@ -239,7 +241,7 @@ def check_two_laws(laws: object) -> None:
 
 
 def _are_two(values: object, fits: Callable[[object], bool]) -> bool:
-    """Return whether ``values`` are two, one for each body or axis, and both fit."""
+    """Return whether ``values`` are two, one for each body, and both fit."""
     return isinstance(values, tuple | list) and len(values) == 2 and all(map(fits, values))
 
 
@@ -421,13 +423,14 @@ def last_cycle(contact: FaceSolution, state: FaceState) -> ContactEnd:
 def gap_on(face: ContactFace, grid: Grid) -> Array:
     """Return the unworn gap of a face on a grid over it ``(nx, ny)`` [mm]."""
     gap = face.gap(grid.x, grid.y)
-    try:
-        return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
-    except ValueError as error:
-        raise InputError(
-            f"{face.face.name}: the gap has shape {np.shape(gap)} at x {grid.x.shape} and y "
-            f"{grid.y.shape}: give {grid.shape}"
-        ) from error
+    # Values in a row would be spread along y, whatever they belong to.
+    if np.ndim(gap) != 1:
+        with suppress(ValueError):
+            return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
+    raise InputError(
+        f"{face.face.name}: the gap has shape {np.shape(gap)} at x {grid.x.shape} and y "
+        f"{grid.y.shape}: give {grid.shape}"
+    )
 
 
 def _follow(contact: Contact, wear: Wear) -> bool | None:

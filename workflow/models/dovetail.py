@@ -223,7 +223,7 @@ class DovetailJoint:
         if interface.name in self.added:
             gap = self.added[interface.name].on(gap)
         size, nodes = self.geometry.flank_size(side), self.mesh.flank_nodes
-        widen = "widen structure.edge_width or structure.end_width"
+        widen = "widen edge_width or end_width"
         return ContactFace(interface, size, gap, nodes, widen)
 
     def node_numbers(self, place: int) -> None:
@@ -262,13 +262,13 @@ class DovetailJoint:
         if moments and self.sides == "guided" and self.geometry.skew == 0.0:
             yield Remark(
                 "the sides of the disk's sector are guided, so they carry no moment; with "
-                "structure.sides: cyclic they move as those of the next sectors do",
+                "cyclic sides they move as those of the next sectors do",
                 is_warning=False,
             )
         slope, largest = float(np.tan(self.geometry.flank_angle)), max(friction)
         if largest > slope:
             yield Remark(
-                f"friction.coefficient {largest:g} exceeds the tangent of the flank angle, "
+                f"friction of {largest:g} exceeds the tangent of the flank angle, "
                 f"{slope:.3g}: the joint locks, and the blade does not move back when the load "
                 "falls"
             )

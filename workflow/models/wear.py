@@ -19,7 +19,7 @@ from wear.coupled_state import CoupledState, Observer, check_observers, observed
 from wear.schedule import CoupledSettings
 from wear.steps.steppers import ROUNDING
 from workflow.errors import ModelWarning
-from workflow.models.checks.limits import check_explicit_steps, check_jumps
+from workflow.models.checks.limits import check_explicit_steps, check_jumps, unstable_fraction
 from workflow.models.checks.start import check_origin, origin_of
 from workflow.models.checks.warnings import (
     dissimilar_warning,
@@ -27,6 +27,7 @@ from workflow.models.checks.warnings import (
     growth_warnings,
     instability_warning,
     link_warning,
+    open_warnings,
     yield_warning,
 )
 from workflow.models.contact import (
@@ -224,10 +225,12 @@ class WearModel:
             check_jumps(self.settings(loads), state)
             stable = [found.stable_cycles for found in first]
             check_explicit_steps(self.wear.cycles, self.wear.fraction, stable)
-            for message in _warnings(loads, contacts, first):
+            for message in filter(
+                None, [unstable_fraction(self.wear.fraction), *_warnings(loads, contacts, first)]
+            ):
                 warnings.warn(message, ModelWarning, stacklevel=2)
             end, found = loop.run(state), None
-            for message in _end_warnings(contacts, end, recorder):
+            for message in _end_warnings(contacts, first, end, recorder):
                 warnings.warn(message, ModelWarning, stacklevel=2)
             if self.stress is not None:
                 with observed(observers, "stress"):
@@ -302,6 +305,8 @@ def _warnings(
     if isinstance(loads, StructureLoads):
         yield from (remark.text for remark in loads.remarks() if remark.is_warning)
     yield from friction_warnings(stages)
+    for stage, contact in zip(stages, first, strict=True):
+        yield from open_warnings(stage.name, contact.pressure.sum(axis=(1, 2)), loads.peak)
     yield from border_warnings(stages, first)
     if _half_spaces(contacts):
         yield from few_cells_warnings(stages, [contact.pressure[loads.peak] for contact in first])
@@ -312,11 +317,15 @@ def _warnings(
 
 
 def _end_warnings(
-    contacts: FaceContacts, end: CoupledState[Any], recorder: ResultsRecorder
+    contacts: FaceContacts,
+    first: Sequence[FirstContact],
+    end: CoupledState[Any],
+    recorder: ResultsRecorder,
 ) -> Iterator[str]:
-    """Return what makes the worn surfaces at the end of a run wrong."""
+    """Return what makes the worn surfaces at the end of a run wrong, and was not known before."""
     if _half_spaces(contacts):
-        yield from growth_warnings(contacts.faces(end))
+        faces = zip(contacts.faces(end), first, strict=True)
+        yield from growth_warnings([face for face, found in faces if not found.touches_border])
         pressures = [fields.pressure for fields in recorder.fields[-1]]
         yield from few_cells_warnings(contacts.stages, pressures, worn=True)
 

@@ -50,6 +50,16 @@ def check_jumps(settings: CoupledSettings, state: CoupledState[Any]) -> None:
     check_count("wear jumps", count, MOST_JUMPS, "give a longer jump, or none")
 
 
+def unstable_fraction(fraction: float | None) -> str:
+    """Return the warning for explicit steps of a ``fraction`` above their stability limit."""
+    if fraction is None or fraction <= 1.0:
+        return ""
+    return (
+        f"explicit steps of {fraction:g} times their stability limit amplify the roughness of the "
+        "grid; usual: 0.9 or less"
+    )
+
+
 def check_explicit_steps(cycles: float, fraction: float | None, stable: Iterable[float]) -> None:
     """Raise InputError if steps of a ``fraction`` of the ``stable`` cycles would be too many."""
     if fraction is not None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from sa_solver.types import Material
+from sa_solver.types import Array, Material
 from wear.contact.interface import FirstContact, InterfaceContact
 from wear.contact.link import StructureLink
 from workflow.models.contact import FaceContact, WornFaces
@@ -27,6 +27,17 @@ def friction_warnings(stages: Sequence[FaceContact]) -> Iterator[str]:
                 f"{stage.name}: the coefficient of friction is {friction:g}; usual: {low:g} to "
                 f"{high:g}"
             )
+
+
+def open_warnings(name: str, carried: Array, peak: int) -> Iterator[str]:
+    """Yield the warning for a contact that carries nothing at all, or nothing at ``peak`` load.
+
+    ``carried`` ``(t,)`` is the load of every increment in any unit.
+    """
+    if carried.max() <= 0.0:
+        yield f"{name} is never closed: it does not wear"
+    elif carried[peak] <= 0.0:
+        yield f"{name} is open at peak load: there is no pressure and no stress to show there"
 
 
 def dissimilar_warning(stages: Sequence[FaceContact], first: Sequence[FirstContact]) -> str:

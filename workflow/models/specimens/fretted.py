@@ -190,24 +190,24 @@ class FrettedSpecimens:
         if not contact.converged:
             raise MethodFailed(
                 f"contact at {force} did not converge after {state.cycles:.4g} cycles; change "
-                "mesh.pad_elements or lower wear.step.fraction"
+                "pad_elements or lower the fraction of a block"
             )
         if self.energy is not None and contact.energy == 0.0:
             raise UserError(
-                f"wear.energy: nothing slides at {force}, so this energy is never dissipated: "
-                "raise load_path.stroke or friction.coefficient, or give wear.cycles"
+                f"energy: nothing slides at {force}, so this energy is never dissipated: raise the "
+                "stroke or the friction, or give cycles"
             )
         if state.wear.any() and np.isinf(state.stable_cycles):
             raise UserError(
-                f"mesh.pad_elements: only one node of the pad touches at {force}, too few to wear: "
-                "raise it, or load_path.normal_forces"
+                f"pad_elements: only one node of the pad touches at {force}, too few to wear: "
+                "raise it, or the normal force"
             )
         # Number of blocks of the run if all are as long as the first one.
         needed = state.number or self._to_go(state) / self._block(state)
         if needed > MOST_BLOCKS:
             raise UserError(
-                f"wear: more than {MOST_BLOCKS} cycle blocks at {force}: lower the wear "
-                "coefficients, the cycles or the energy, or lengthen wear.step"
+                f"more than {MOST_BLOCKS} cycle blocks at {force}: lower the wear coefficients, "
+                "the cycles or the energy, or lengthen the blocks"
             )
 
 

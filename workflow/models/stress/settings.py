@@ -75,12 +75,10 @@ class Stress:
         if self.section == "none":
             return
         if self.section == "y" and grid.line:
-            raise InputError(
-                "stress.section: y: a line contact has no length along y; allowed: x, none"
-            )
+            raise InputError("section: y: a line contact has no length along y; allowed: x, none")
         reach = 0.5 * grid.size[1 if self.section == "x" else 0]
         if abs(self.at) > reach:
             raise InputError(
-                f"stress.at: {self.at:g} mm is outside the contact's grid; allowed: {-reach:.4g} "
+                f"at: {self.at:g} mm is outside the contact's grid; allowed: {-reach:.4g} "
                 f"to {reach:.4g} mm"
             )

@@ -27,6 +27,7 @@ from workflow.case.fields import shown
 from workflow.case.plausibility import idle_steps, uneven_cells
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 from workflow.case.text.plain import entries, of_bodies, plain, shares, times
+from workflow.models.checks.limits import unstable_fraction
 from workflow.models.checks.names import is_group_name
 
 # Names of the entries of summary and results, which interfaces must not have.
@@ -211,6 +212,8 @@ class WearCase(WithScans, Case):
 
     def plausibility_warnings(self) -> Iterator[str]:
         yield from idle_steps("wear.step.cycles", self.wear.step.cycles, self.wear.cycles)
+        if warning := unstable_fraction(self.wear.step.fraction):
+            yield f"wear.step.fraction: {warning}"
         if (sides := self.face_sides()) is not None:
             yield from uneven_cells(sides, self.contact.grid)
 

@@ -23,6 +23,7 @@ from workflow.models.checks.warnings import (
     dissimilar_warning,
     growth_warnings,
     instability_warning,
+    open_warnings,
     yield_warning,
 )
 from workflow.models.contact import FaceContact, WornFaces, border_warnings
@@ -69,14 +70,10 @@ def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: 
             "nonlinearity.stiffness"
         )
     for history in unworn.histories:
-        name, P = history.interface.name, history.loads.P
-        if P.max() <= 0.0:
-            reporter.warn(f"{name} is never closed: it does not wear")
-        elif P[stage.peak] <= 0.0:
-            reporter.warn(
-                f"{name} is open at peak load: there is no pressure and no stress to show there"
-            )
-        else:
+        P = history.loads.P
+        for warning in open_warnings(history.interface.name, P, stage.peak):
+            reporter.warn(warning)
+        if P[stage.peak] > 0.0:
             _warn_of_few_nodes(history, stage, reporter)
             _warn_of_form(history, stage, reporter)
 
@@ -153,6 +150,8 @@ def warn_of_contact(
     Raises UserError if a contact has too few cells.
     """
     stages = [stage for stage, _ in faces]
+    if not isinstance(source, StructureLoads):
+        _warn_of_open(stages, first, source.peak, reporter)
     if warning := dissimilar_warning(stages, first):
         reporter.warn(warning)
     for line in border_warnings(stages, first):
@@ -170,6 +169,15 @@ def warn_of_contact(
         check_cells(stage.name, settings, stage.grid, pressure, reporter)
         for line in structure_of(case).warnings(case, stage, float(state.loads.P[source.peak])):
             reporter.warn(line)
+
+
+def _warn_of_open(
+    stages: Sequence[FaceContact], first: Sequence[FirstContact], peak: int, reporter: Reporter
+) -> None:
+    """Warn of half-space contacts that carry nothing, or nothing at peak load."""
+    for stage, result in zip(stages, first, strict=True):
+        for warning in open_warnings(stage.name, result.pressure.sum(axis=(1, 2)), peak):
+            reporter.warn(warning)
 
 
 def _energies_differ(
