@@ -473,14 +473,17 @@ class LoadHistory:
     def mix(cls, cycles: Sequence[LoadHistory], shares: Sequence[float]) -> LoadHistory:
         """Return a mix of closed ``cycles``, one per mission.
 
-        ``shares`` are the relative frequencies of the cycles; they should add up to 1.
+        ``shares`` are the relative frequencies of the cycles, which add up to 1.
         """
+        each = checks.array("shares", shares, (len(cycles),))
+        if (each < 0.0).any() or not np.isclose(each.sum(), 1.0):
+            raise InputError(f"shares {each.tolist()}: give 0 or more, which add up to 1")
         lengths = [len(cycle) for cycle in cycles]
         columns = {
             column.name: np.concatenate([getattr(cycle, column.name) for cycle in cycles])
             for column in fields(cls)
         }
-        columns["share"] = np.repeat(np.asarray(shares, dtype=np.float64), lengths)
+        columns["share"] = np.repeat(each, lengths)
         columns["block"] = np.repeat(np.arange(len(cycles)), lengths)
         return cls(**columns)
 

@@ -20,6 +20,7 @@ from wear.schedule import CoupledSettings
 from wear.steps.steppers import ROUNDING
 from workflow.errors import ModelWarning
 from workflow.models.checks.limits import check_explicit_steps, check_jumps, unstable_fraction
+from workflow.models.checks.loads import check_loads
 from workflow.models.checks.start import check_origin, origin_of
 from workflow.models.checks.warnings import (
     dissimilar_warning,
@@ -53,6 +54,7 @@ from workflow.models.stress.structure_stress import (
 from workflow.models.structure import StructureLoads
 from workflow.models.structure_model import StructureModel, StructureStore
 from workflow.models.uncoupled.body_pair import BodyPair
+from workflow.models.uncoupled.given_loads import GivenLoads
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -147,6 +149,12 @@ class WearModel:
                 "or method full"
             )
         pairs = zip(faces, contacts, strict=True)
+        if "normal" in methods and isinstance(loads, GivenLoads) and loads.without_slip:
+            lacking = ", ".join(loads.without_slip)
+            raise InputError(
+                f"method normal wears by the slips of the loads, but {lacking} has none: give "
+                "slips for every face, or method full"
+            )
         return FaceContacts.half_spaces(
             [FaceContact(face, contact, self.wear, InterfaceContact) for face, contact in pairs]
         )
@@ -212,6 +220,7 @@ class WearModel:
         # The matrices of contacts and increments are small: threads would only cost time.
         with one_thread():
             unworn = loads.unworn()
+            check_loads(loads, unworn)
             contacts = self.face_contacts(loads)
             if self.stress is not None:
                 for stage in contacts.stages:

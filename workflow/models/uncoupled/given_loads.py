@@ -105,6 +105,11 @@ class GivenLoads(UncoupledSource):
         """True if the loads of a face include the slips of its nodes."""
         return any(isinstance(loads, CycleLoads) for _, loads in self.pairs)
 
+    @property
+    def without_slip(self) -> list[str]:
+        """Names of the faces whose loads do not include the slips of their nodes."""
+        return [face.face.name for face, loads in self.pairs if not isinstance(loads, CycleLoads)]
+
     @cached_property
     def peak(self) -> int:  # type: ignore[override]
         """First increment in which a face carries the largest P of all faces."""
