@@ -47,6 +47,13 @@ class Link:
     second: str | None
     first: str | None = None
 
+    def __post_init__(self) -> None:
+        if self.second == self.first:
+            raise RigError(
+                f"a link joins {self.second or 'ground'} to itself and never stretches: give two "
+                "points, or one and ground"
+            )
+
 
 def lumped_rig(
     masses: Mapping[str, float],

@@ -91,6 +91,11 @@ class MotionModel:
         count, size = self.duration / self.control.step, len(self.rig.model.names)
         longer = "give a longer step or a shorter duration"
         check_count("time steps", count, MOST_TIME_STEPS, longer)
+        if self.control.every > np.ceil(count):
+            raise InputError(
+                f"a row every {self.control.every} of {np.ceil(count):g} time steps: none is "
+                "recorded after the first; give a smaller every"
+            )
         recorded = count / self.control.every * size
         check_count(
             "recorded displacements", recorded, MOST_RECORDED, f"{longer}, or a larger every"
@@ -146,7 +151,7 @@ class MotionModel:
         Warns
         -----
         ModelWarning
-            The time steps are too long for the motion.
+            The time steps are too long for the motion, or nothing moves.
 
         Raises
         ------
@@ -166,6 +171,12 @@ class MotionModel:
             warnings.warn(
                 f"the time steps cause an error of {100.0 * motion.error:.1f} % of the largest "
                 "displacement: take shorter ones",
+                ModelWarning,
+                stacklevel=2,
+            )
+        if not (motion.displacement.any() or self.force.value(motion.times).any()):
+            warnings.warn(
+                f"nothing moves: the force is 0 for all of the {self.duration:g} s",
                 ModelWarning,
                 stacklevel=2,
             )

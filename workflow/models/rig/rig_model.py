@@ -261,6 +261,8 @@ class RigModel:
         Both are along the direction number ``along``.
         """
         stretch, force, shared = motion.joint_displacement, motion.joint_force, self.shared
+        if not shared.any():
+            return np.zeros(len(force)), np.zeros(len(force))
         pulled = force[:, shared, self.along].sum(axis=1)
         return stretch[:, shared, self.along].mean(axis=1), pulled
 

@@ -94,6 +94,11 @@ class VibrationModel:
                 "above 0"
             )
         checks.settle(self, forces=tuple(forces.tolist()))
+        names = [f"{force:g}" for force in self.forces]
+        if len(set(names)) < len(names):
+            raise InputError(
+                f"VibrationModel.forces are {', '.join(names)}: give each once, six digits apart"
+            )
         checks.numbers(self, "normal_load", least=0.0)
         if self.normal_load and self.rig.pressing is None:
             raise InputError(
