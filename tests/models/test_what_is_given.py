@@ -10,6 +10,7 @@ import pytest
 from fe_models.geometry import Specimen
 from sa_solver import InputError, LoadHistory, Material
 from wear import ArchardLaw, CycleLoads, EnergyLaw
+from wear.evolution import CoulombFriction, EnergyTable
 
 TITANIUM, LAW = Material(115e3, 0.29), EnergyLaw(1e-8)
 STROKE = fretscale.LoadTable.stroke(P=50.0, stroke=0.02)
@@ -130,6 +131,24 @@ def test_implausible_models_are_warned_of(changed, wear, warning):
     settings = fretscale.Wear(**{"cycles": 100.0} | wear)
     with pytest.warns(fretscale.ModelWarning, match=warning):
         model(of=contact(**changed), wear=settings).run()
+
+
+@pytest.mark.parametrize("last", [0.01, 0.0])
+def test_friction_that_falls_within_a_step_is_warned_of(last):
+    """The transient is over after a few of 100 cycles: one step has only the friction at its end.
+
+    While µ falls from 0.6 to 0.006, 1 N mm is dissipated; a cycle has 1.2 N mm at first.
+    """
+    falling = CoulombFriction(0.6, EnergyTable((0.0, 1.0), (1.0, last)))
+    with pytest.warns(fretscale.ModelWarning, match="friction (changes|vanishes)"):
+        model(of=contact(friction=falling, method="full")).run()
+
+
+def test_friction_that_falls_slowly_is_not_warned_of():
+    falling = CoulombFriction(0.6, EnergyTable((0.0, 1e3), (1.0, 0.5)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model(of=contact(friction=falling, method="full")).run()
 
 
 def test_a_plausible_model_is_not_warned_of():

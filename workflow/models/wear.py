@@ -24,6 +24,7 @@ from workflow.models.checks.loads import check_loads
 from workflow.models.checks.start import check_origin, origin_of
 from workflow.models.checks.warnings import (
     dissimilar_warning,
+    friction_step_warnings,
     friction_warnings,
     growth_warnings,
     instability_warning,
@@ -332,6 +333,7 @@ def _end_warnings(
     recorder: ResultsRecorder,
 ) -> Iterator[str]:
     """Return what makes the worn surfaces at the end of a run wrong, and was not known before."""
+    yield from friction_step_warnings(contacts.stages, first, end)
     if _half_spaces(contacts):
         faces = zip(contacts.faces(end), first, strict=True)
         yield from growth_warnings([face for face, found in faces if not found.touches_border])

@@ -37,6 +37,7 @@ from workflow.analyses.wear.worn.worn_structure import nonlinearity_sentence
 from workflow.errors import MethodFailed, UserError
 from workflow.models.budget.budget import interface_outcomes
 from workflow.models.checks.limits import check_explicit_steps, check_jumps
+from workflow.models.checks.warnings import friction_step_warnings
 from workflow.models.contact import ContactEnd, last_cycle
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import ContactFace, LoadSource
@@ -162,6 +163,8 @@ def _march(
     with reporter.course("wear"):
         end = loop.run(state, steps)
     steps.save()
+    for warning in friction_step_warnings(contacts.stages, first, end):
+        reporter.warn(warning)
     warn_of_worn_cells(case, source.peak, contacts.faces(end), reporter)
     return end, first
 
