@@ -48,10 +48,11 @@ class Link:
     first: str | None = None
 
     def __post_init__(self) -> None:
-        if self.second == self.first:
+        # A direction that a joint lacks joins ground to ground.
+        if self.second is not None and self.second == self.first:
             raise RigError(
-                f"a link joins {self.second or 'ground'} to itself and never stretches: give two "
-                "points, or one and ground"
+                f"a link joins {self.second} to itself and never stretches: give two points, or "
+                "one and ground"
             )
 
 

@@ -153,4 +153,4 @@ def test_forces_have_different_names(model):
     """Results of one name would replace each other."""
     for forces in ((0.1, 0.1), (0.1, 0.1 * (1.0 + 1e-9))):
         with pytest.raises(InputError, match="each once"):
-            replace(model, forces=forces)
+            replace(model, forces=forces).run()

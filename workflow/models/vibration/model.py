@@ -94,11 +94,6 @@ class VibrationModel:
                 "above 0"
             )
         checks.settle(self, forces=tuple(forces.tolist()))
-        names = [f"{force:g}" for force in self.forces]
-        if len(set(names)) < len(names):
-            raise InputError(
-                f"VibrationModel.forces are {', '.join(names)}: give each once, six digits apart"
-            )
         checks.numbers(self, "normal_load", least=0.0)
         if self.normal_load and self.rig.pressing is None:
             raise InputError(
@@ -162,9 +157,14 @@ class VibrationModel:
             The joints do not balance the static load, or there is no motion under a force.
         """
         check_observers(observers)
+        names = list(map(self.structure.driving.amount.as_text, self.forces))
+        if len(set(names)) < len(names):
+            raise InputError(
+                f"VibrationModel.forces are {', '.join(names)}, which are names of results: give "
+                "each once"
+            )
         responses = {}
-        for force in self.forces:
-            name = self.structure.driving.amount.as_text(force)
+        for name, force in zip(names, self.forces, strict=True):
             with observed(observers, name):
                 responses[name] = self.response(force, steps, observers)
             for message in responses[name].faults(self.sweep.accuracy):
