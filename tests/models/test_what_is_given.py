@@ -123,6 +123,7 @@ def test_a_contact_of_few_cells_is_warned_of(cells):
             {"cycles": 1e6, "steps": "explicit", "jump": fretscale.JumpSize(cycles=5e5)},
             "amplify the roughness",
         ),
+        ({}, {"steps": "explicit", "fraction": 5.0}, "5 times their stability limit"),
         ({}, {"cycles": 1e6}, "touches the border"),
     ],
 )
@@ -155,6 +156,18 @@ def test_a_plausible_model_is_not_warned_of():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         model().run()
+
+
+class Whole:
+    """A user's wear law that forgets the cells."""
+
+    def depth_per_pressure(self, sliding):
+        return np.float64(1e-8)
+
+
+def test_a_wear_law_returns_a_depth_for_every_cell():
+    with pytest.raises(InputError, match="Whole returns depths per pressure of shape"):
+        model(of=contact(laws=(Whole(), LAW))).run()
 
 
 def test_a_contact_of_one_point_is_refused():

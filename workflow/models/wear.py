@@ -189,7 +189,7 @@ class WearModel:
             Called while the run goes on, such as :class:`fretscale.Progress`.
         start : CoupledState, optional
             State of an earlier run of the same model to resume from, such as that of a
-            :class:`fretscale.Checkpoint`.
+            :class:`fretscale.Checkpoint`. Only ``cycles`` and ``stop`` of its wear may differ.
         store : StructureStore, optional
             Storage of condensed structures between runs.
 
