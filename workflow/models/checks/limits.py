@@ -1,4 +1,4 @@
-"""Largest numbers of steps and points of a run.
+"""Largest numbers of steps and points of a run, and usual values.
 
 A run beyond these limits would hardly end, and is most likely due to a mistaken unit. Models and
 cases refuse it before anything is computed, with the number that it would take.
@@ -34,6 +34,9 @@ MOST_CELLS = 4096**2
 
 MOST_INCREMENTS = 100_000
 """Increments of a cycle of loads: each is a contact problem."""
+
+USUAL_FRICTION = 0.02, 1.2
+"""Usual coefficients of friction: lubricated surfaces to clean metals."""
 
 
 def check_count(what: str, count: float, most: int, remedy: str) -> None:

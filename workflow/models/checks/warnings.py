@@ -15,10 +15,8 @@ from sa_solver.types import Array, Material
 from wear.contact.interface import FirstContact, InterfaceContact
 from wear.contact.link import StructureLink
 from wear.coupled_state import CoupledState
+from workflow.models.checks.limits import USUAL_FRICTION
 from workflow.models.contact import FaceContact, WornFaces
-
-USUAL_FRICTION = 0.02, 1.2
-"""Usual coefficients of friction: lubricated surfaces to clean metals."""
 
 LARGEST_CHANGE = 0.5
 """Largest relative change of friction within a wear jump. Where it falls to 0.5 within the first
