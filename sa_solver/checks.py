@@ -7,9 +7,10 @@ numbers, and fail far from the cause where a list or a single number is given in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import index
-from typing import Any, Literal
+from types import NoneType
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ REAL = "fiu"
 """Kinds of numpy data types that hold real numbers: floats, signed and unsigned integers."""
 
 Shape = Sequence[int | None]
+
+LONGEST_SHOWN = 60
+"""Length of a wrong value in a message, which must stay one readable line."""
 
 
 def array(
@@ -100,7 +104,7 @@ def number(
     """
     plain: Any = np.ma.asanyarray(value)
     if plain.ndim or np.ma.getmaskarray(plain).any() or plain.dtype.kind not in REAL:
-        raise error(f"{name} is {value!r}: give one real number")
+        raise error(f"{name} is {shown(value)}: give one real number")
     found = float(plain)
     inside = found > above and least <= found <= most
     if not (inside and (np.isfinite(found) or (infinite and found == np.inf))):
@@ -117,20 +121,70 @@ def numbers(holder: object, *names: str, **bounds: Any) -> None:
 
     A field may be None where None is its default.
     """
-    for name in names:
-        value, optional = getattr(holder, name), getattr(type(holder), name, ...) is None
-        if value is not None or not optional:
-            number(name.replace("_", " "), value, **bounds)
+    for name, value in _given(holder, names):
+        number(field(holder, name), value, **bounds)
 
 
-def whole(name: str, value: Any, error: type[FretscaleError] = InputError) -> int:
-    """Return ``value`` as an integer, or raise ``error``: a truth value is no number."""
+def whole(
+    name: str,
+    value: Any,
+    error: type[FretscaleError] = InputError,
+    *,
+    least: float = -np.inf,
+    most: float = np.inf,
+) -> int:
+    """Return ``value`` as an integer from ``least`` to ``most``, or raise ``error``.
+
+    A truth value is no number.
+    """
     try:
-        if not isinstance(value, bool):
-            return index(value)
+        found = None if isinstance(value, bool) else index(value)
     except TypeError:
-        pass
-    raise error(f"{name} is {value!r}: give a whole number")
+        found = None
+    if found is None:
+        raise error(f"{name} is {shown(value)}: give a whole number")
+    if not least <= found <= most:
+        bounds = [f"{least:g} or more"] if least > -np.inf else []
+        bounds += [f"at most {most:g}"] if most < np.inf else []
+        raise error(f"{name} = {found}: give {' and '.join(bounds)}")
+    return found
+
+
+def wholes(holder: object, *names: str, **bounds: Any) -> None:
+    """Check the fields ``names`` of ``holder`` by :func:`whole`; see :func:`numbers`."""
+    for name, value in _given(holder, names):
+        whole(field(holder, name), value, **bounds)
+
+
+def instances(holder: object, **kinds: Any) -> None:
+    """Raise InputError unless the named fields of ``holder`` are of these kinds.
+
+    A kind is a class, several as a union such as ``str | None``, or :data:`Callable`.
+    """
+    for name, kind in kinds.items():
+        if not isinstance(value := getattr(holder, name), kind):
+            raise InputError(f"{field(holder, name)} is {shown(value)}: give {_called(kind)}")
+
+
+def members(holder: object, **kinds: Any) -> None:
+    """Raise InputError unless the named fields of ``holder`` hold values of these kinds only.
+
+    The fields are lists or tuples, which become tuples, or mappings, which stay as they are.
+    """
+    for name, kind in kinds.items():
+        values = getattr(holder, name)
+        if not isinstance(values, list | tuple | Mapping):
+            raise InputError(
+                f"{field(holder, name)} is {shown(values)}: give several, each {_called(kind)}"
+            )
+        keys: Any = values if isinstance(values, Mapping) else range(len(values))
+        for key in keys:
+            if not isinstance(values[key], kind):
+                raise InputError(
+                    f"{field(holder, name)}[{key!r}] is {shown(values[key])}: give {_called(kind)}"
+                )
+        if not isinstance(values, Mapping):
+            settle(holder, **{name: tuple(values)})
 
 
 def places(
@@ -147,14 +201,48 @@ def choice(
     name: str, value: object, allowed: Sequence[str], error: type[FretscaleError] = InputError
 ) -> None:
     """Raise ``error`` unless ``value`` is one of those ``allowed``."""
-    if value not in allowed:
-        raise error(f"{name} is {value!r}: give {' or '.join(allowed)}")
+    if not isinstance(value, str) or value not in allowed:
+        raise error(f"{name} is {shown(value)}: give {' or '.join(allowed)}")
+
+
+def choices(holder: object, **allowed: Sequence[str]) -> None:
+    """Raise InputError unless the named fields of ``holder`` are among those ``allowed``."""
+    for name, values in allowed.items():
+        choice(field(holder, name), getattr(holder, name), values)
 
 
 def settle(frozen: object, **fields: object) -> None:
     """Set checked ``fields`` of a ``frozen`` dataclass instance during its construction."""
     for name, value in fields.items():
         object.__setattr__(frozen, name, value)
+
+
+def field(holder: object, name: str) -> str:
+    """Return the name of a field of ``holder`` in messages, such as ``Wear.cycles``."""
+    return f"{type(holder).__name__}.{name}"
+
+
+def shown(value: object) -> str:
+    """Return ``value`` as text for a message of one line."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        return f"an array of shape {value.shape}"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."
+
+
+def _given(holder: object, names: Sequence[str]) -> list[tuple[str, Any]]:
+    """Return names and values of fields, without those that are None by default."""
+    values = [(name, getattr(holder, name)) for name in names]
+    return [(n, v) for n, v in values if v is not None or getattr(type(holder), n, ...) is not None]
+
+
+def _called(kind: Any) -> str:
+    """Return a class, or the classes of a union, in words."""
+    names = {Callable: "a function", Mapping: "a mapping", NoneType: "None", bool: "True or False"}
+    return " or ".join(
+        names.get(each) or f"{'an' if each.__name__[0] in 'AEIO' else 'a'} {each.__name__}"
+        for each in get_args(kind) or (kind,)
+    )
 
 
 def _without_mask(

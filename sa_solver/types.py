@@ -449,13 +449,19 @@ class LoadHistory:
 
     def __post_init__(self) -> None:
         if not self.block.size and not self.share.size:
-            object.__setattr__(self, "share", np.ones(len(self.P)))
-            object.__setattr__(self, "block", np.zeros(len(self.P), dtype=np.int64))
+            count = len(checks.array("values of P", self.P, (None,), finite=False))
+            checks.settle(self, share=np.ones(count), block=np.zeros(count, dtype=np.int64))
         forces = [f.name for f in fields(self) if f.name not in ("sliding", "share", "block")]
         for name in (*forces, "share"):
             column = checks.array(f"values of {name}", getattr(self, name), (None,), finite=False)
             checks.settle(self, **{name: column})
-        checks.settle(self, sliding=np.asarray(self.sliding, dtype=bool))
+        sliding: Any = np.asarray(self.sliding)
+        if sliding.ndim != 1 or sliding.dtype.kind not in "biuf":
+            raise InputError(
+                f"LoadHistory.sliding is {checks.shown(self.sliding)}: give True or False for each "
+                "increment"
+            )
+        checks.settle(self, sliding=sliding.astype(bool))
         lengths = {len(getattr(self, f.name)) for f in fields(self)}
         if len(lengths) != 1:
             raise InputError(f"columns of a load history differ in length: {sorted(lengths)}")
@@ -467,14 +473,17 @@ class LoadHistory:
     def mix(cls, cycles: Sequence[LoadHistory], shares: Sequence[float]) -> LoadHistory:
         """Return a mix of closed ``cycles``, one per mission.
 
-        ``shares`` are the relative frequencies of the cycles; they should add up to 1.
+        ``shares`` are the relative frequencies of the cycles, which add up to 1.
         """
+        each = checks.array("shares", shares, (len(cycles),))
+        if (each < 0.0).any() or not np.isclose(each.sum(), 1.0):
+            raise InputError(f"shares {each.tolist()}: give 0 or more, which add up to 1")
         lengths = [len(cycle) for cycle in cycles]
         columns = {
             column.name: np.concatenate([getattr(cycle, column.name) for cycle in cycles])
             for column in fields(cls)
         }
-        columns["share"] = np.repeat(np.asarray(shares, dtype=np.float64), lengths)
+        columns["share"] = np.repeat(each, lengths)
         columns["block"] = np.repeat(np.arange(len(cycles)), lengths)
         return cls(**columns)
 

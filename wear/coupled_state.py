@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic
 
 import numpy as np
 
+from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.contact.contacts import WearingContacts
 from wear.contact.interface import InterfaceState
@@ -45,6 +47,9 @@ class CoupledState(Generic[Worn]):
         Number of solutions of the load source.
     cost
         Cost of all contact solutions.
+    origin
+        Digests of the parts of the model that the state belongs to; empty where the caller ensures
+        that.
     """
 
     interfaces: tuple[Worn, ...]
@@ -54,6 +59,7 @@ class CoupledState(Generic[Worn]):
     solved_resultants: Array
     solutions: int
     cost: Cost
+    origin: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def jump(self) -> int:
@@ -106,6 +112,15 @@ class Observer:
 
     def reached(self, share: float) -> None:
         """Handle that about this ``share`` of a curve, or of a motion in time, is computed."""
+
+
+def check_observers(observers: object) -> None:
+    """Raise InputError unless ``observers`` are a list or tuple of them."""
+    if not isinstance(observers, list | tuple):
+        raise InputError(f"observers are {checks.shown(observers)}: give a list, even of one")
+    for observer in observers:
+        if not isinstance(observer, Observer):
+            raise InputError(f"observers have {checks.shown(observer)}: give an Observer")
 
 
 @contextmanager

@@ -109,6 +109,7 @@ class CoulombFriction:
 
     def __post_init__(self) -> None:
         checks.numbers(self, "coefficient", least=0.0)
+        checks.instances(self, evolution=EnergyTable | None)
 
     def at(self, energy: float) -> float:
         """Return the coefficient after the contact has dissipated ``energy`` [N mm]."""

@@ -163,12 +163,15 @@ def compare(folders: tuple[Path, ...], out: Path | None, force: bool) -> None:
     from workflow.comparing.showing import show
 
     compared = compare(folders)
-    show(compared)
+    written: list[Path] = []
     if out is not None:
         from workflow.comparing.writing import write_comparison
 
-        for path in write_comparison(compared, out, force):
-            click.echo(path)
+        # Before anything is shown: an output that cannot be written ends the command.
+        written = write_comparison(compared, out, force)
+    show(compared)
+    for path in written:
+        click.echo(path)
 
 
 @cli.command()

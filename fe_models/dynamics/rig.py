@@ -47,6 +47,14 @@ class Link:
     second: str | None
     first: str | None = None
 
+    def __post_init__(self) -> None:
+        # A direction that a joint lacks joins ground to ground.
+        if self.second is not None and self.second == self.first:
+            raise RigError(
+                f"a link joins {self.second} to itself and never stretches: give two points, or "
+                "one and ground"
+            )
+
 
 def lumped_rig(
     masses: Mapping[str, float],

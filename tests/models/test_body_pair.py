@@ -1,5 +1,6 @@
 """Tests of two bodies without finite elements that are built and worn in Python."""
 
+from dataclasses import replace
 from math import inf
 
 import fretscale
@@ -12,6 +13,7 @@ from wear import EnergyLaw
 from workflow.analyses.wear.model import wear_model
 
 TITANIUM, LAW = Material(115e3, 0.29), EnergyLaw(1e-8)
+STROKE = fretscale.LoadTable.stroke(P=50.0, stroke=0.02)
 
 
 def contact(grid=(24, 24), **settings):
@@ -151,3 +153,22 @@ def test_forces_without_a_motion_take_the_full_method():
     loads = fretscale.LoadTable({"P": [20.0, 20.0], "Qx": [5.0, -5.0]})
     with pytest.raises(InputError, match="has Qx: give method full"):
         run(bodies(loads))
+
+
+@pytest.mark.parametrize("gap", [lambda x, y: x.ravel() ** 2 / 20.0, lambda x, y: y.ravel()])
+def test_gaps_in_a_row_are_refused(gap):
+    """On a square grid those along x would be spread along y."""
+    with pytest.raises(InputError, match="the gap has shape"):
+        fretscale.WearModel(
+            replace(bodies(STROKE), gap=gap), contact(), fretscale.Wear(cycles=10.0)
+        ).run()
+
+
+@pytest.mark.parametrize(
+    "loads", [{"P": [0.0, 0.0], "shift_x": [0.01, -0.01]}, {"approach": [-0.01] * 2}]
+)
+def test_bodies_that_never_touch_are_warned_of(loads):
+    table = fretscale.LoadTable({"shift_x": [0.01, -0.01]} | loads)
+    model = fretscale.WearModel(bodies(table), contact(), fretscale.Wear(cycles=10.0))
+    with pytest.warns(fretscale.ModelWarning, match="never closed"):
+        assert model.run()["interface"]["volume_1"].values[-1] == 0.0

@@ -4,7 +4,7 @@ import fretscale
 import numpy as np
 import pytest
 
-from sa_solver import LoadHistory, Material
+from sa_solver import InputError, LoadHistory, Material
 from wear import CycleLoads, EnergyLaw
 from workflow.analyses.wear.model import wear_model
 from workflow.kinds import parse_case, template
@@ -75,3 +75,60 @@ def test_the_peak_is_that_of_the_heaviest_face():
     assert (loads.peak, loads.line) == (1, True)
     assert loads.user_faces(1) == ()
     np.testing.assert_array_equal(loads.probe([])[:, 0], [10.0, 20.0])
+
+
+SLIP = np.zeros((2, 2, 2))
+SLIP[:, 0] = [[0.02], [-0.02]]
+
+
+class Own(fretscale.UncoupledSource):
+    """A user's source of loads, of which some parts may be wrong."""
+
+    line, peak = True, 0
+
+    def __init__(self, **parts):
+        self.__dict__ |= {"names": ("pad",), "loads": history(50.0, 20.0), "slip": SLIP} | parts
+
+    @property
+    def faces(self):
+        return tuple(map(pad, self.names))
+
+    def unworn(self):
+        return (CycleLoads(self.loads, self.slip),) * len(self.names)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"peak": 2},
+        {"peak": -1},
+        {"line": False},
+        {"names": ()},
+        {"names": ("pad", "pad")},
+        {"loads": history(-50.0, 20.0)},
+        {"loads": history(np.nan, 20.0)},
+        {"slip": np.zeros((2, 2, 5))},
+    ],
+)
+def test_loads_of_a_user_fit_their_faces(wrong):
+    """Without a check they would wear another face, another amount or nothing."""
+    wear = fretscale.Wear(cycles=100.0)
+    fretscale.WearModel(Own(), contact("normal"), wear).run()
+    with pytest.raises(InputError):
+        fretscale.WearModel(Own(**wrong), contact("normal"), wear).run()
+
+
+def test_every_face_has_slips_where_they_wear_it():
+    pairs = [(pad(), CycleLoads(history(50.0, 20.0), SLIP)), (pad("foot"), history(50.0, 20.0))]
+    model = fretscale.WearModel(
+        fretscale.GivenLoads(pairs), contact("normal"), fretscale.Wear(cycles=100.0)
+    )
+    with pytest.raises(InputError, match="foot has none"):
+        model.run()
+
+
+def test_shares_of_missions_add_up():
+    cycle = history(50.0, 20.0)
+    for wrong in ((0.9, 0.9), (-0.5, 1.5), (1.0,), (np.nan, 1.0)):
+        with pytest.raises(InputError, match="shares"):
+            LoadHistory.mix([cycle, cycle], wrong)

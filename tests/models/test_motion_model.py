@@ -75,6 +75,18 @@ def test_a_step_resolves_the_force(model, force):
         replace(model, force=force, control=TimeStepControl(1.1 * force.longest_step))
 
 
+def test_a_motion_without_force_is_warned_of(model):
+    """A blow after the end of the motion would give none, without an error."""
+    late = HammerBlow(np.ones(1), FORCE, duration=2e-3, start=5.0)
+    with pytest.warns(fretscale.ModelWarning, match="nothing moves"):
+        replace(model, force=late).run()
+
+
+def test_rows_are_recorded_before_the_end(model):
+    with pytest.raises(InputError, match="none is recorded"):
+        replace(model, control=TimeStepControl(2e-5, every=10**6))
+
+
 class Counted(HarmonicForce):
     """Force that counts how often it is evaluated, and interrupts the run after so many times."""
 

@@ -9,6 +9,7 @@ import pytest
 import xarray
 
 from fe_models.dynamics import Accuracy, HarmonicBalance, Link, Resolution, lumped_rig
+from sa_solver import InputError
 from tests.conftest import CASES
 from wear.joints import Jenkins
 from workflow.messages.warning_kinds import WarningKind
@@ -148,3 +149,10 @@ def test_a_model_vibrates_as_its_case(tmp_path):
 def test_only_vibration_cases_have_such_a_model():
     with pytest.raises(fretscale.UserError):
         fretscale.vibration_model(CASES / "sphere_normal.yaml")
+
+
+def test_forces_have_different_names(model):
+    """Results of one name would replace each other."""
+    for forces in ((0.1, 0.1), (0.1, 0.1 * (1.0 + 1e-9))):
+        with pytest.raises(InputError, match="each once"):
+            replace(model, forces=forces).run()

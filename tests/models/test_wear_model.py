@@ -135,7 +135,7 @@ def test_stress_under_a_contact_balances_its_loads(model):
 
 def test_a_section_beside_the_grid_is_refused(model):
     for wrong in (fretscale.Stress(at=2.0), fretscale.Stress("y")):
-        with pytest.raises(InputError, match=r"stress\."):
+        with pytest.raises(InputError, match="contact"):
             replace(model, stress=wrong).run()
     with pytest.raises(InputError, match="depth"):
         fretscale.Stress(depth=0.01)
@@ -198,6 +198,39 @@ def test_a_state_of_another_model_is_refused(tmp_path, model):
     (tmp_path / "state.h5").write_bytes(b"nothing")
     with pytest.raises(fretscale.UserError):
         checkpoint.state()
+
+
+def test_a_state_belongs_to_its_laws_materials_and_contacts(tmp_path, model):
+    """A run from a state that other settings have worn would be a mixture of both."""
+    checkpoint = fretscale.Checkpoint(tmp_path / "state.h5")
+    with pytest.raises(KeyboardInterrupt):
+        model.run([checkpoint, Interrupted(2)])
+    state, contact = checkpoint.state(), model.contacts
+    softer, faster = Material(100e3, 0.3), EnergyLaw(1e-6)
+    for changed in (
+        {"bodies": (softer, softer)},
+        {"laws": (contact.laws[0], faster)},
+        {"friction": 0.3},
+        {"method": "full"},
+        {"tolerance": 1e-6},
+    ):
+        other = replace(model, contacts=replace(contact, **changed))
+        with pytest.raises(InputError, match="another model: its contacts differ"):
+            other.run(start=state)
+    stepped = replace(model, wear=replace(model.wear, steps="second_order"))
+    with pytest.raises(InputError, match="another model: its wear settings differ"):
+        stepped.run(start=state)
+    with pytest.raises(InputError, match="give a state"):
+        model.run(start=tmp_path / "state.h5")
+
+
+def test_a_longer_run_goes_on_from_the_state_of_a_shorter_one(tmp_path, model):
+    checkpoint = fretscale.Checkpoint(tmp_path / "state.h5")
+    replace(model, wear=replace(model.wear, cycles=1000.0)).run([checkpoint])
+    rest = model.run(start=checkpoint.state())["pad"]
+    assert rest["cycles"].values.tolist() == [1000.0, 1500.0, 2000.0]
+    worn = 1e-4 / 3000.0 * 50.0 * 0.08 * 2000.0  # Archard's law
+    assert rest["volume_1"].values[-1] == pytest.approx(worn, rel=1e-12)
 
 
 def test_a_contact_at_the_border_is_warned_of(model):

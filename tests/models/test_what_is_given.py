@@ -1,5 +1,6 @@
 """Models refuse settings without a meaning, and warn of implausible ones."""
 
+import warnings
 from dataclasses import replace
 
 import fretscale
@@ -9,6 +10,7 @@ import pytest
 from fe_models.geometry import Specimen
 from sa_solver import InputError, LoadHistory, Material
 from wear import ArchardLaw, CycleLoads, EnergyLaw
+from wear.evolution import CoulombFriction, EnergyTable
 from workflow.messages.warning_kinds import WarningKind
 
 TITANIUM, LAW = Material(115e3, 0.29), EnergyLaw(1e-8)
@@ -57,6 +59,7 @@ def history(P=(50.0, 50.0)):
         lambda: fretscale.Wear(cycles=10.0, jump=5.0),
         lambda: fretscale.Wear(cycles=10.0, stop=5.0),
         lambda: fretscale.Wear(cycles=10.0, fraction=0.5),
+        lambda: fretscale.Wear(cycles=10.0, steps="explicit"),
         lambda: fretscale.Wear(
             cycles=10.0, steps="explicit", fraction=0.5, jump=fretscale.JumpSize(cycles=1.0)
         ),
@@ -110,6 +113,69 @@ def test_a_contact_of_few_cells_is_warned_of(cells):
         model(of=contact(grid=cells)).run()
 
 
+@pytest.mark.parametrize(
+    ("changed", "wear", "warning"),
+    [
+        ({"bodies": (replace(TITANIUM, yield_stress=100.0),) * 2}, {}, "above the yield stress"),
+        ({"bodies": (TITANIUM, Material(210e3, 0.3))}, {}, "Dundurs' beta"),
+        ({"friction": 50.0}, {}, "coefficient of friction is 50"),
+        (
+            {},
+            {"cycles": 1e6, "steps": "explicit", "jump": fretscale.JumpSize(cycles=5e5)},
+            "amplify the roughness",
+        ),
+        ({}, {"steps": "explicit", "fraction": 5.0}, "5 times their stability limit"),
+        ({}, {"cycles": 1e6}, "touches the border"),
+    ],
+)
+def test_implausible_models_are_warned_of(changed, wear, warning):
+    """The last one wears up to the border of its grid: its first cycle does not reach it."""
+    settings = fretscale.Wear(**{"cycles": 100.0} | wear)
+    with pytest.warns(fretscale.ModelWarning, match=warning):
+        model(of=contact(**changed), wear=settings).run()
+
+
+@pytest.mark.parametrize("last", [0.01, 0.0])
+def test_friction_that_falls_within_a_step_is_warned_of(last):
+    """The transient is over after a few of 100 cycles: one step has only the friction at its end.
+
+    While µ falls from 0.6 to 0.006, 1 N mm is dissipated; a cycle has 1.2 N mm at first.
+    """
+    falling = CoulombFriction(0.6, EnergyTable((0.0, 1.0), (1.0, last)))
+    with pytest.warns(fretscale.ModelWarning, match="friction (changes|vanishes)"):
+        model(of=contact(friction=falling, method="full")).run()
+
+
+def test_friction_that_falls_slowly_is_not_warned_of():
+    falling = CoulombFriction(0.6, EnergyTable((0.0, 1e3), (1.0, 0.5)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model(of=contact(friction=falling, method="full")).run()
+
+
+def test_a_plausible_model_is_not_warned_of():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model().run()
+
+
+class Whole:
+    """A user's wear law that forgets the cells."""
+
+    def depth_per_pressure(self, sliding):
+        return np.float64(1e-8)
+
+
+def test_a_wear_law_returns_a_depth_for_every_cell():
+    with pytest.raises(InputError, match="Whole returns depths per pressure of shape"):
+        model(of=contact(laws=(Whole(), LAW))).run()
+
+
+def test_a_contact_of_one_point_is_refused():
+    with pytest.raises(InputError, match="meaningless"):
+        model(ball(size=(6.0, 6.0))).run()
+
+
 def joint():
     return fretscale.wear_model("cases/dovetail_2d.yaml").structure
 
@@ -147,6 +213,15 @@ def test_a_dovetail_that_cannot_be_drawn_is_refused(changed):
     """Angles are in radians: 45 would be drawn as another angle."""
     with pytest.raises(fretscale.FretscaleError):
         replace(joint().geometry, **changed)
+
+
+@pytest.mark.parametrize(("body", "name"), [("disk", "the disk"), ("blade", "the blade")])
+def test_a_body_without_mass_is_warned_of(body, name):
+    """Its own centrifugal load is missing."""
+    massless = replace(joint(), **{body: replace(TITANIUM, density=0.0)})
+    remarks = [remark.text for remark in massless.remarks(None, [0.1]) if remark.kind is not None]
+    assert len(remarks) == 1
+    assert remarks[0].startswith(f"{name} has no density")
 
 
 def test_elements_are_of_order_1_or_2():

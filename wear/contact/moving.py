@@ -51,6 +51,9 @@ body 1. Those of a sphere, half on each body, were 0.6 % to 0.8 % at 0.1, 1.3 % 
 2.2 % to 2.5 % at 0.2. Where only one body wears they are smaller, and 0 if that is body 2.
 """
 
+LONGEST = 10
+"""Largest offset in lengths of the grid: beyond, most of the wear is carried off the grid."""
+
 GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
 """Gauss points of the unit interval, with a weight of one half each."""
 
@@ -79,7 +82,13 @@ class Passage:
         path = self.path / self.grid.pitch
         if self.grid.line:
             path[:, 1] = 0.0
-        reach = np.floor(np.abs(path).max(axis=0)).astype(int) + 1
+        farthest = np.abs(path).max(axis=0)
+        if (farthest > LONGEST * np.array(self.grid.shape)).any():
+            raise TravelError(
+                f"surfaces move over each other by {np.ptp(self.path, axis=0).max():.3g} mm, more "
+                f"than {2 * LONGEST} times the size of the grid: check the unit of the motion"
+            )
+        reach = np.floor(farthest).astype(int) + 1
         lengths = np.hypot(*np.diff(path * self.grid.pitch, axis=0).T)
         shares = lengths / lengths.sum() if lengths.any() else np.ones_like(lengths) / len(lengths)
         weights = np.zeros(2 * reach + 1)
@@ -113,7 +122,7 @@ class Passage:
             if beyond > 0:
                 raise TravelError(
                     f"the stroke carries wear {beyond} cells beyond the end of the grid along "
-                    f"{name}: make the grid (contact.size) longer by "
+                    f"{name}: make its size larger by "
                     f"{2 * beyond * self.grid.pitch[axis]:.3g} mm or more"
                 )
 

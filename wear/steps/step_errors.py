@@ -82,7 +82,7 @@ def step_errors(state: WornState, areas: Array | float = 1.0) -> dict[str, float
     bodies = [
         (error, depth)
         for error, depth in zip(state.errors, state.surfaces.depths, strict=True)
-        if depth.any()
+        if root_mean_square(depth, depth) > 0.0
     ]
     if not bodies or state.coarse is None:
         return None

@@ -31,7 +31,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sa_solver.errors import ConvergenceError
+from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.half_space.influence import Z
 from sa_solver.normal.contact import NormalContact, NormalStart, NormalState
 from sa_solver.rigid_modes import NORMAL
@@ -216,6 +216,11 @@ class WearingContact:
             law.depth_per_pressure(SlidingConditions(slip[mission], self.friction, work, energies))
             for mission in loads.missions
         ]
+        if any(np.shape(p) != slip[m].shape for p, m in zip(parts, loads.missions, strict=True)):
+            raise InputError(
+                f"{type(law).__name__} returns depths per pressure of shape {np.shape(parts[0])}: "
+                "give one for each increment and cell, as the slip has"
+            )
         depth: Array = loads.share[:, None, None] * np.concatenate(parts)
         return depth
 

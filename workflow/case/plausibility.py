@@ -20,6 +20,7 @@ from workflow.case.fields import Quantity
 from workflow.case.sections import Case, entry_of
 from workflow.case.text.plain import between, display_unit, plain
 from workflow.messages.warning_kinds import Notice, WarningKind
+from workflow.models.checks.limits import USUAL_FRICTION
 
 # Aspect ratio of cells above which a grid wastes most of them.
 SQUARE = 5.0
@@ -55,8 +56,8 @@ USUAL = (
     Usual("materials.*.density", "t/mm^3", 5e-10, 2.3e-8),
     Usual("materials.*.expansion", "1/K", 1e-7, 3e-4),
     Usual("materials.*.yield_stress", "MPa", 2.0, 2e4),
-    Usual("friction.coefficient", "1", 0.02, 1.2),
-    Usual("joint.friction", "1", 0.02, 1.2),
+    Usual("friction.coefficient", "1", *USUAL_FRICTION),
+    Usual("joint.friction", "1", *USUAL_FRICTION),
     # Metals wear 1e2 to 1e6 um^3 per joule.
     Usual("wear.*.[ck]*", "1/MPa", 1e-12, 1e-5),
     Usual("wear.*.coefficient", "1", 1e-9, 3e-2),

@@ -325,6 +325,12 @@ class WarningKind(MessageKind):
         "lacks this volume.",
         "Name a larger face, or take the fields on the grid from results.h5.",
     )
+    NO_DENSITY = (
+        "FS-W213",
+        "A body under rotation or acceleration has no density",
+        "The forces of the body's own mass are missing. The contacts carry less than in reality.",
+        "Give the material of the body a density.",
+    )
 
     # --- wear -----------------------------------------------------------------------------------
     ACCURACY_EXCEEDED = (
@@ -379,6 +385,13 @@ class WarningKind(MessageKind):
         "Wear becomes steady only near the end of the run",
         "The steady value is taken from few points and may still change.",
         "Raise the energy or the number of cycles.",
+    )
+    FRICTION_CHANGES = (
+        "FS-W309",
+        "Friction changes much within a wear step",
+        "A step has the friction at its end. Energy and wear of the cycles before it are computed "
+        "with a wrong coefficient, and the estimated errors do not show this.",
+        "Take shorter wear steps where friction changes.",
     )
 
     # --- vibration and time ---------------------------------------------------------------------
@@ -494,6 +507,12 @@ class WarningKind(MessageKind):
         "Loops of the table are under another load",
         "The stiffness of a contact depends on its normal load, so the joint has a wrong one.",
         "Compute the loops under the load of the joint.",
+    )
+    NO_FORCE = (
+        "FS-W418",
+        "Nothing moves",
+        "The force is 0 for the whole duration of the motion.",
+        "Check when the force begins, and how long the motion is followed.",
     )
 
     # --- fits and measurements ------------------------------------------------------------------

@@ -22,17 +22,21 @@ from fe_models.imported_structure import (
     imported_softening,
     imported_structure,
 )
-from fe_models.loads.applied_loads import AppliedLoad, Rotation
+from fe_models.loads.applied_loads import Acceleration, AppliedLoad, Rotation
 from fe_models.loads.pretension import Bolt, Pretension, bolt_section
 from fe_models.meshes.curved_face import Surface
 from fe_models.meshes.cut_face import whole_face
 from fe_models.meshes.second_order import with_midsides
 from fe_models.meshes.structure_mesh import Face, Interface, StructureMesh
 from fe_models.structure import Structure
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.surfaces.shapes import PARTING_SLOPE
 from sa_solver.types import Array, Indices, Material
 from workflow.messages.warning_kinds import WarningKind
+from workflow.models.checks.limits import MOST_INCREMENTS
+from workflow.models.checks.names import check_face_name
+from workflow.models.checks.warnings import weightless_warnings
 from workflow.models.faces import face_size, planes_of_symmetry
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
@@ -77,11 +81,18 @@ class LegPath:
     mix: tuple[tuple[tuple[float, ...], float], ...] = ()
 
     def __post_init__(self) -> None:
+        checks.members(self, increments=int | np.integer, factors=list | tuple, mix=list | tuple)
+        for count in self.increments:
+            checks.whole("LegPath.increments of a leg", count, least=1, most=MOST_INCREMENTS)
         if any(len(of_load) != len(self.increments) for of_load in self.factors):
             raise InputError(
                 f"{len(self.increments)} legs: give as many factors for every load, one at the end "
                 "of each leg"
             )
+        checks.array("LegPath.factors", self.factors, (None, None))
+        legs = len(self.increments)
+        checks.wholes(self, "cycle_from", least=1, most=legs)
+        checks.wholes(self, "peak_leg", least=self.cycle_from, most=legs)
 
     @property
     def before(self) -> int:
@@ -127,6 +138,11 @@ class TightenedBolt:
     load: int
     name: str
     force: float | None = None
+
+    def __post_init__(self) -> None:
+        checks.wholes(self, "load", least=0)
+        checks.instances(self, name=str)
+        checks.numbers(self, "force", above=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,6 +203,23 @@ class MeshAssembly:
     nonlinearity: Nonlinearity = field(default_factory=Nonlinearity)
     finer: str = "refine the mesh there, or take elements of order 2"
     joined: StructureMesh | None = None
+
+    def __post_init__(self) -> None:
+        checks.instances(
+            self,
+            imported=ImportedMesh,
+            bodies=Mapping,
+            path=LegPath,
+            added=Mapping,
+            nonlinearity=Nonlinearity,
+            joined=StructureMesh | None,
+        )
+        checks.members(
+            self, bodies=Material, contacts=ContactPair, supports=Support, added=AddedGap
+        )
+        checks.wholes(self, "order", least=1, most=2)
+        for contact in self.contacts:
+            check_face_name(contact.name)
 
     @property
     def tightening(self) -> int:
@@ -279,7 +312,13 @@ class MeshAssembly:
         return FinerMesh(replace(self, order=2, joined=None))
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
-        """Return the unit of the mesh, and contacts that supports or planes of symmetry cut."""
+        """Return the unit of the mesh, bodies without mass, and contacts that are cut.
+
+        Supports or planes of symmetry cut contacts.
+        """
+        if any(isinstance(load, Rotation | Acceleration) for load in self.loads):
+            for kind, text in weightless_warnings(self.bodies):
+                yield Remark(text, kind)
         unit = self.imported.unit
         if unit.size != 1.0:
             yield Remark(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from math import prod
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -13,7 +15,7 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
-from sa_solver.surfaces.resolution import fewest_across, peak_error, too_few_across
+from sa_solver.surfaces.resolution import fewest_across, is_point, peak_error, too_few_across
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
@@ -30,6 +32,7 @@ from wear.steps.steppers import ExplicitStepper, Stepper
 from wear.steps.stepping import WearingContact, WearState
 from wear.surfaces import Surfaces
 from workflow.messages.warning_kinds import Notice, WarningKind
+from workflow.models.checks.limits import MOST_CELLS, MOST_JUMPS, check_count
 from workflow.models.loads import ContactFace
 
 WearStepper = Stepper[WearState, WearingContact]
@@ -39,6 +42,7 @@ STEPS = "implicit", "second_order", "explicit"
 # A run with explicit steps, a fraction of their stability limit each, is recorded in this many
 # jumps: single steps are too short to record.
 RECORDS = 10
+LONGER_JUMPS = "give a longer jump, or none, so that an error estimate chooses it"
 # A larger tolerance of the contact solver would return its first guess.
 LARGEST_TOLERANCE = 1e-3
 
@@ -94,14 +98,23 @@ class Contact:
     tolerance: float = 1e-8
 
     def __post_init__(self) -> None:
-        checks.choice("method", self.method, ("normal", "full", "nodes"))
-        checks.choice("link", self.link, ("corrected", "half_space"))
-        checks.choice("gross_slip", self.gross_slip, ("force", "energies"))
+        checks.choices(
+            self,
+            method=("normal", "full", "nodes"),
+            link=("corrected", "half_space"),
+            gross_slip=("force", "energies"),
+        )
         checks.numbers(self, "tolerance", above=0.0, most=LARGEST_TOLERANCE)
-        if not _are_two(self.bodies, lambda body: isinstance(body, Material)):
-            raise InputError("bodies: give two, the Material of body 1 and that of body 2")
-        if not _are_two(self.laws, lambda law: hasattr(law, "depth_per_pressure")):
-            raise InputError("laws: give two, the wear law of body 1 and that of body 2")
+        if np.shape(self.grid) != (2,):
+            raise InputError(
+                f"Contact.grid is {checks.shown(self.grid)}: give two numbers of cells, 1 along y "
+                "in a line contact"
+            )
+        cells = [checks.whole("a number of cells in Contact.grid", n, least=1) for n in self.grid]
+        check_count("cells", prod(cells), MOST_CELLS, "give Contact.grid fewer")
+        checks.settle(self, grid=tuple(cells))
+        check_two_bodies(self.bodies)
+        check_two_laws(self.laws)
         if not isinstance(self.friction, CoulombFriction):
             checks.settle(self, friction=CoulombFriction(self.friction))
 
@@ -166,13 +179,17 @@ class Wear:
     motion: Literal["auto", "follow", "neglect"] = "auto"
 
     def __post_init__(self) -> None:
-        checks.choice("steps", self.steps, STEPS)
-        checks.choice("motion", self.motion, MOTIONS)
+        checks.choices(self, steps=STEPS, motion=MOTIONS, resultants=("drift", "constant", "every"))
         checks.numbers(self, "cycles", above=0.0)
         checks.numbers(self, "tolerance", "depth_tolerance", "fraction", above=0.0)
-        if not isinstance(self.jump, JumpSize) or not isinstance(self.stop, Stop):
+        checks.numbers(self, "drift", least=0.0)
+        checks.instances(self, jump=JumpSize, stop=Stop)
+        if self.jump.cycles is not None:
+            check_count("wear jumps", self.cycles / self.jump.cycles, MOST_JUMPS, LONGER_JUMPS)
+        if self.steps == "explicit" and self.automatic:
             raise InputError(
-                f"jump is {self.jump!r} and stop {self.stop!r}: give a JumpSize and a Stop"
+                "Wear.steps: explicit steps have no error estimate that chooses their length: give "
+                "jump or fraction"
             )
         if self.fraction is not None and (self.steps != "explicit" or self.jump != JumpSize()):
             raise InputError(
@@ -204,6 +221,23 @@ class Wear:
         jump = self.jump if self.fraction is None else JumpSize(cycles=self.cycles / RECORDS)
         return CoupledSettings(
             self.cycles, jump, self.stop, self.resultants, self.drift, friction=friction
+        )
+
+
+def check_two_bodies(bodies: object) -> None:
+    """Raise InputError unless ``bodies`` are two materials."""
+    if not _are_two(bodies, lambda body: isinstance(body, Material)):
+        raise InputError(
+            f"bodies are {checks.shown(bodies)}: give two, the Material of body 1 and that of "
+            "body 2"
+        )
+
+
+def check_two_laws(laws: object) -> None:
+    """Raise InputError unless ``laws`` are two wear laws."""
+    if not _are_two(laws, lambda law: hasattr(law, "depth_per_pressure")):
+        raise InputError(
+            f"laws are {checks.shown(laws)}: give two, the wear law of body 1 and that of body 2"
         )
 
 
@@ -338,17 +372,28 @@ WornFaces = Sequence[tuple[FaceContact, FaceState]]
 
 
 def few_cells_warnings(
-    stages: Sequence[FaceContact], first: Sequence[FirstContact], peak: int
+    stages: Sequence[FaceContact], pressures: Sequence[Array], worn: bool = False
 ) -> Iterator[Notice]:
-    """Yield the warnings for contacts that cover too few cells at the ``peak`` load, unworn."""
-    for stage, found in zip(stages, first, strict=True):
-        if across := too_few_across(found.pressure[peak] > 0.0, stage.grid.line):
-            yield Notice(
-                WarningKind.FEW_CELLS,
+    """Yield the warnings for contacts that cover too few cells at peak load.
+
+    ``pressures`` ``(nx, ny)`` [MPa] are those of each contact, unworn or ``worn``. Raises
+    InputError for an unworn contact that is a single point on its grid.
+    """
+    after = " after wear" if worn else ""
+    for stage, pressure in zip(stages, pressures, strict=True):
+        if not (across := too_few_across(pressure > 0.0, stage.grid.line)):
+            continue
+        if is_point(pressure > 0.0) and not worn:
+            raise InputError(
                 f"{stage.name}: the contact is only {' x '.join(map(str, across))} cells across, "
-                f"and {fewest_across(stage.grid.line)} are needed: the largest pressure may have "
-                f"an error of {100.0 * peak_error(min(across)):.1f} %: give it a finer grid",
+                "so that its size and pressure are meaningless: give it a finer grid"
             )
+        yield Notice(
+            WarningKind.FEW_CELLS,
+            f"{stage.name}: the contact is only {' x '.join(map(str, across))} cells across"
+            f"{after}, and {fewest_across(stage.grid.line)} are needed: the largest pressure may "
+            f"have an error of {100.0 * peak_error(min(across)):.1f} %: give it a finer grid",
+        )
 
 
 def border_warnings(
@@ -383,13 +428,14 @@ def last_cycle(contact: FaceSolution, state: FaceState) -> ContactEnd:
 def gap_on(face: ContactFace, grid: Grid) -> Array:
     """Return the unworn gap of a face on a grid over it ``(nx, ny)`` [mm]."""
     gap = face.gap(grid.x, grid.y)
-    try:
-        return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
-    except ValueError as error:
-        raise InputError(
-            f"{face.face.name}: the gap has shape {np.shape(gap)} at x {grid.x.shape} and y "
-            f"{grid.y.shape}: give {grid.shape}"
-        ) from error
+    # Values in a row would be spread along y, whatever they belong to.
+    if np.ndim(gap) != 1:
+        with suppress(ValueError):
+            return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
+    raise InputError(
+        f"{face.face.name}: the gap has shape {np.shape(gap)} at x {grid.x.shape} and y "
+        f"{grid.y.shape}: give {grid.shape}"
+    )
 
 
 def _follow(contact: Contact, wear: Wear) -> bool | None:

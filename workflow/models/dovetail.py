@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
+from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -20,6 +21,7 @@ from sa_solver.errors import InputError
 from sa_solver.types import Material
 from workflow.messages.warning_kinds import WarningKind
 from workflow.models.budget.convergence import MESH_ORDER, share_of_difference
+from workflow.models.checks.warnings import weightless_warnings
 from workflow.models.gaps import AddedGap, GapFunction
 from workflow.models.loads import ContactFace
 from workflow.models.structure_model import FinerMesh, LoadCycle, Nonlinearity, Remark
@@ -63,8 +65,15 @@ class DovetailMesh:
     order: Literal[1, 2] = 1
 
     def __post_init__(self) -> None:
-        if self.order not in (1, 2):
-            raise InputError(f"order is {self.order!r}: give 1 or 2")
+        checks.wholes(self, "order", least=1, most=2)
+        checks.wholes(self, "notch", least=3)
+        checks.numbers(self, "size", above=0.0)
+        checks.members(self, flank_nodes=int | np.integer)
+        if len(self.flank_nodes) != 2 or min(self.flank_nodes) < FEWEST_NODES:
+            raise InputError(
+                f"DovetailMesh.flank_nodes is {self.flank_nodes}: give two numbers of nodes, "
+                f"{FEWEST_NODES} or more across a flank and along the slot"
+            )
 
     def refined(self, factor: float) -> DovetailMesh:
         """Return the mesh with elements that are finer by ``factor``; its notches stay the same."""
@@ -134,6 +143,18 @@ class DovetailJoint:
     )
 
     def __post_init__(self) -> None:
+        checks.instances(
+            self,
+            geometry=Dovetail,
+            disk=Material,
+            blade=Material,
+            mesh=DovetailMesh,
+            added=Mapping,
+            nonlinearity=Nonlinearity,
+            finer=str,
+        )
+        checks.members(self, missions=Mission, shares=Real, added=AddedGap)
+        checks.wholes(self, "dimension", least=2, most=3)
         if len(self.missions) != len(self.shares) or not self.missions:
             raise InputError(
                 f"{len(self.missions)} missions and {len(self.shares)} shares: give as many of "
@@ -141,7 +162,7 @@ class DovetailJoint:
             )
         if min(self.shares) < 0.0 or not np.isclose(sum(self.shares), 1.0):
             raise InputError(f"shares {self.shares}: give 0 or more, which add up to 1")
-        checks.choice("sides", self.sides, ("guided", "cyclic"))
+        checks.choices(self, sides=("guided", "cyclic"))
         if unknown := self.added.keys() - SIDES.keys():
             raise InputError(f"no flank called {', '.join(unknown)}: give intrados or extrados")
 
@@ -203,7 +224,7 @@ class DovetailJoint:
         if interface.name in self.added:
             gap = self.added[interface.name].on(gap)
         size, nodes = self.geometry.flank_size(side), self.mesh.flank_nodes
-        widen = "widen structure.edge_width or structure.end_width"
+        widen = "widen edge_width or end_width"
         return ContactFace(interface, size, gap, nodes, widen)
 
     def node_numbers(self, place: int) -> None:
@@ -236,16 +257,18 @@ class DovetailJoint:
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
         """Yield remarks: sides that a moment would move, and a joint that locks itself."""
+        for kind, text in weightless_warnings({"the disk": self.disk, "the blade": self.blade}):
+            yield Remark(text, kind)
         moments = any(mission.aerodynamic_moment for mission in self.missions)
         if moments and self.sides == "guided" and self.geometry.skew == 0.0:
             yield Remark(
                 "the sides of the disk's sector are guided, so they carry no moment; with "
-                "structure.sides: cyclic they move as those of the next sectors do"
+                "cyclic sides they move as those of the next sectors do"
             )
         slope, largest = float(np.tan(self.geometry.flank_angle)), max(friction)
         if largest > slope:
             yield Remark(
-                f"friction.coefficient {largest:g} exceeds the tangent of the flank angle, "
+                f"friction of {largest:g} exceeds the tangent of the flank angle, "
                 f"{slope:.3g}: the joint locks, and the blade does not move back when the load "
                 "falls",
                 WarningKind.JOINT_LOCKS,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.types import Array, Grid
 
 if TYPE_CHECKING:
@@ -43,12 +44,17 @@ class AddedGap:
     over: GapFunction
     nodal: Callable[[Interface], Array] | None = None
 
+    def __post_init__(self) -> None:
+        checks.instances(self, over=Callable, nodal=Callable | None)
+
     def at_nodes(self, face: Interface) -> Array:
         """Return the gap at the nodes of a meshed face ``(n,)`` [mm]."""
         if self.nodal is not None:
-            return self.nodal(face)
+            values = self.nodal(face)
+            return checks.array("added gaps", np.broadcast_to(values, len(face)), (len(face),))
         points = face.coordinates[:, :, None, None]
-        return np.array([float(np.asarray(self.over(x, y))[0, 0]) for x, y in points])
+        values = np.array([np.broadcast_to(self.over(x, y), (1, 1))[0, 0] for x, y in points])
+        return checks.array("added gaps", values, (len(face),))
 
     def on(self, form: GapFunction) -> GapFunction:
         """Return the sum of a ``form`` and this gap."""

@@ -10,10 +10,13 @@ from typing import Literal, Protocol, Self
 import numpy as np
 
 from fe_models.meshes.structure_mesh import Face
+from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Frame, Grid, Indices
 from wear import load_sources
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads, FaceLoads
+from workflow.models.checks.names import check_face_name
 
 BODIES: tuple[Literal[1, 2], ...] = (1, 2)
 # Without a mesh, the grid that shows the resolution error has cells larger by this factor.
@@ -59,6 +62,11 @@ class ContactFace:
     remedy: str = "make the face larger or round its edges"
     drive: Drive = field(default_factory=Drive)
 
+    def __post_init__(self) -> None:
+        checks.instances(self, face=Face, gap=Callable, remedy=str, drive=Drive)
+        check_face_name(self.face.name)
+        check_size("ContactFace.size", self.size, self.face.line)
+
     @classmethod
     def nominal(
         cls,
@@ -73,6 +81,9 @@ class ContactFace:
 
         A ``line`` contact extends along x, with loads per length.
         """
+        if not isinstance(line, bool):
+            raise InputError(f"line is {checks.shown(line)}: give True or False")
+        check_size("size", size, line)
         coarse = FEWEST, 1 if line else FEWEST
         face = nominal_face(name, size, line)
         return cls(face, size, gap, coarse, drive=drive or Drive())
@@ -192,6 +203,16 @@ class UncoupledSource(ABC):
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
         """Return no faces: the loads have no mesh with the user's node numbers."""
         return ()
+
+
+def check_size(name: str, size: object, line: bool) -> None:
+    """Raise InputError unless ``size`` is an extent along x and y, both above 0 [mm].
+
+    A ``line`` contact uses the first one only.
+    """
+    lengths = checks.array(f"lengths of {name}", size, (2,), finite=False).tolist()
+    for length in lengths[: 1 if line else 2]:
+        checks.number(f"a length of {name} [mm]", length, above=0.0)
 
 
 def nominal_face(

@@ -20,6 +20,7 @@ from sa_solver.types import Array, Tilt
 from wear.contact.interface import InterfaceState
 from wear.steps.stepping import ContactFailure
 from workflow.errors import UserError
+from workflow.models.checks.limits import MOST_INCREMENTS
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,8 @@ class TangentialLoops:
 
     def __post_init__(self) -> None:
         checks.numbers(self, "amplitude", "force", "normal_force", above=0.0)
-        checks.choice("axis", self.axis, ("x", "y"))
-        checks.choice("every", self.every, ("jump", "end"))
+        checks.choices(self, axis=("x", "y"), every=("jump", "end"))
+        checks.wholes(self, "increments", least=1, most=MOST_INCREMENTS)
         if (self.amplitude is None) == (self.force is None):
             raise InputError("a tangential loop needs an amplitude or a force, not both")
 

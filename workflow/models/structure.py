@@ -428,6 +428,6 @@ def _converged(solved: Solved) -> Solved:
         raise MethodFailed(
             f"structural friction did not converge: residual {solved.residual:.1e} after "
             f"{solved.iterations} iterations; see that contacts and supports can carry the loads "
-            "and leave no face open, refine load_path.increments or lower friction.coefficient"
+            "and leave no face open, take more increments or lower the friction"
         )
     return solved

@@ -10,15 +10,29 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from fe_models.solvers.blas_threads import one_thread
+from sa_solver import checks
 from sa_solver.errors import InputError
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceContact
 from wear.coupled import CoupledWear
-from wear.coupled_state import CoupledState, Observer, observed
+from wear.coupled_state import CoupledState, Observer, check_observers, observed
 from wear.schedule import CoupledSettings
 from wear.steps.steppers import ROUNDING
 from workflow.errors import ModelWarning
 from workflow.messages.warning_kinds import Notice
+from workflow.models.checks.limits import check_explicit_steps, check_jumps, unstable_fraction
+from workflow.models.checks.loads import check_loads
+from workflow.models.checks.start import check_origin, origin_of
+from workflow.models.checks.warnings import (
+    dissimilar_warnings,
+    friction_step_warnings,
+    friction_warnings,
+    growth_warnings,
+    instability_warnings,
+    link_warnings,
+    open_warnings,
+    yield_warnings,
+)
 from workflow.models.contact import (
     Contact,
     FaceContact,
@@ -42,6 +56,7 @@ from workflow.models.stress.structure_stress import (
 from workflow.models.structure import StructureLoads
 from workflow.models.structure_model import StructureModel, StructureStore
 from workflow.models.uncoupled.body_pair import BodyPair
+from workflow.models.uncoupled.given_loads import GivenLoads
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,12 +100,15 @@ class WearModel:
     stress: Stress | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.contacts, Contact | Mapping):
-            raise InputError("contacts: give a Contact, or one for each face by its name")
-        if not isinstance(self.wear, Wear):
-            raise InputError(f"wear is {self.wear!r}: give a Wear, such as Wear(cycles=1e5)")
-        if not isinstance(self.stress, Stress | None):
-            raise InputError(f"stress is {self.stress!r}: give a Stress, or None")
+        # Structures of finite elements, pairs of bodies, and other sources of loads.
+        if not any(hasattr(self.structure, name) for name in ("meshed", "source", "unworn")):
+            raise InputError(
+                f"WearModel.structure is {checks.shown(self.structure)}: give a structure of "
+                "finite elements, a BodyPair, or a source of loads such as GivenLoads"
+            )
+        checks.instances(self, contacts=Contact | Mapping, wear=Wear, stress=Stress | None)
+        if isinstance(self.contacts, Mapping):
+            checks.members(self, contacts=Contact)
 
     def contact(self, name: str) -> Contact:
         """Return the contact of a face. Raises InputError where the model has none."""
@@ -133,6 +151,12 @@ class WearModel:
                 "or method full"
             )
         pairs = zip(faces, contacts, strict=True)
+        if "normal" in methods and isinstance(loads, GivenLoads) and loads.without_slip:
+            lacking = ", ".join(loads.without_slip)
+            raise InputError(
+                f"method normal wears by the slips of the loads, but {lacking} has none: give "
+                "slips for every face, or method full"
+            )
         return FaceContacts.half_spaces(
             [FaceContact(face, contact, self.wear, InterfaceContact) for face, contact in pairs]
         )
@@ -166,7 +190,7 @@ class WearModel:
             Called while the run goes on, such as :class:`fretscale.Progress`.
         start : CoupledState, optional
             State of an earlier run of the same model to resume from, such as that of a
-            :class:`fretscale.Checkpoint`.
+            :class:`fretscale.Checkpoint`. Only ``cycles`` and ``stop`` of its wear may differ.
         store : StructureStore, optional
             Storage of condensed structures between runs.
 
@@ -180,8 +204,10 @@ class WearModel:
         Warns
         -----
         ModelWarning
-            A contact touches the border of its grid, or covers too few cells; the structure has
-            an obvious fault, or its stress is not fully known.
+            A contact touches the border of its grid, covers too few cells, yields, or is of
+            dissimilar bodies whose coupling ``method`` "normal" neglects; explicit steps are
+            unstable; friction is unusual; the structure has an obvious fault, or its stress is not
+            fully known.
 
         Raises
         ------
@@ -190,23 +216,32 @@ class WearModel:
         MethodFailed, ContactFailure
             A solver did not converge.
         """
-        if not isinstance(observers, Sequence):
-            raise InputError("observers: give a list of them, even of one")
+        check_observers(observers)
         loads = self.loads(store)
         loads.prepare()
         # The matrices of contacts and increments are small: threads would only cost time.
         with one_thread():
             unworn = loads.unworn()
+            check_loads(loads, unworn)
             contacts = self.face_contacts(loads)
             if self.stress is not None:
                 for stage in contacts.stages:
                     self.stress.check(stage.grid)
             recorder = ResultsRecorder(contacts, loads.peak)
-            loop = self.loop(loads, contacts, [*observers, recorder])
+            watching = [*observers, recorder]
+            if self.wear.steps == "explicit" and self.wear.fraction is None:
+                watching.append(StabilityWatch(contacts))
+            loop = self.loop(loads, contacts, watching)
             state, first = self.begin(loop, unworn, start)
-            for notice in _warnings(loads, contacts, first):
+            check_jumps(self.settings(loads), state)
+            stable = [found.stable_cycles for found in first]
+            check_explicit_steps(self.wear.cycles, self.wear.fraction, stable)
+            begun = _warnings(loads, contacts, first)
+            for notice in (*unstable_fraction(self.wear.fraction), *begun):
                 warnings.warn(ModelWarning(*notice), stacklevel=2)
             end, found = loop.run(state), None
+            for notice in _end_warnings(contacts, first, end, recorder):
+                warnings.warn(ModelWarning(*notice), stacklevel=2)
             if self.stress is not None:
                 with observed(observers, "stress"):
                     found = self._stress(self.stress, loads, contacts.faces(end), unworn, first)
@@ -222,9 +257,18 @@ class WearModel:
         Raises InputError unless ``start`` is a state of this model before its last cycle.
         """
         state, first = loop.begin(unworn)
+        names = [face.face.name for face in cast("LoadSource", loop.source).faces]
+        of_faces = {name: self.contact(name) for name in names}
+        origin = origin_of(of_faces, self.wear, self.structure, unworn)
+        state = replace(state, origin=origin)
         if start is None:
             return state, first
-        _check_start(start, state)
+        if not isinstance(start, CoupledState):
+            raise InputError(
+                f"start is {checks.shown(start)}: give a state, such as that of a Checkpoint"
+            )
+        check_origin(start.origin, origin)
+        _check_surfaces(start, state)
         if start.cycles[-1] > self.wear.cycles * (1.0 + ROUNDING):
             raise InputError(
                 f"the state to start from has {start.cycles[-1]:g} cycles, the model "
@@ -267,24 +311,63 @@ def _warnings(
     loads: LoadSource, contacts: FaceContacts, first: Sequence[FirstContact]
 ) -> Iterator[Notice]:
     """Return what makes results wrong though all solvers converge."""
+    stages = contacts.stages
     if isinstance(loads, StructureLoads):
         yield from (Notice(kind, text) for text, kind in loads.remarks() if kind is not None)
-    yield from border_warnings(contacts.stages, first)
-    if all(isinstance(stage.contact, InterfaceContact) for stage in contacts.stages):
-        yield from few_cells_warnings(contacts.stages, first, loads.peak)
+    yield from friction_warnings(stages)
+    for stage, contact in zip(stages, first, strict=True):
+        yield from open_warnings(stage.name, contact.pressure.sum(axis=(1, 2)), loads.peak)
+    yield from border_warnings(stages, first)
+    if _half_spaces(contacts):
+        yield from few_cells_warnings(stages, [contact.pressure[loads.peak] for contact in first])
+    yield from dissimilar_warnings(stages, first)
+    for stage, contact in zip(stages, first, strict=True):
+        yield from link_warnings(stage.name, contact.link)
+        yield from yield_warnings(stage, contact)
 
 
-def _check_start(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:
-    """Raise InputError unless the state to start from fits the model of an ``unworn`` one.
+def _end_warnings(
+    contacts: FaceContacts,
+    first: Sequence[FirstContact],
+    end: CoupledState[Any],
+    recorder: ResultsRecorder,
+) -> Iterator[Notice]:
+    """Return what makes the worn surfaces at the end of a run wrong, and was not known before."""
+    yield from friction_step_warnings(contacts.stages, first, end)
+    if _half_spaces(contacts):
+        faces = zip(contacts.faces(end), first, strict=True)
+        yield from growth_warnings([face for face, found in faces if not found.touches_border])
+        pressures = [fields.pressure for fields in recorder.fields[-1]]
+        yield from few_cells_warnings(contacts.stages, pressures, worn=True)
 
-    Faces and their gaps must be the same, and the loads too where wear has not changed them yet.
+
+def _half_spaces(contacts: FaceContacts) -> bool:
+    """Return whether the contacts are half-spaces, and not nodes that the grid only shows."""
+    return all(isinstance(stage.contact, InterfaceContact) for stage in contacts.stages)
+
+
+@dataclass
+class StabilityWatch(Observer):
+    """Observer that warns once of explicit steps beyond their stability limit."""
+
+    contacts: FaceContacts
+    warned: bool = False
+
+    def jump_started(self, state: CoupledState[Any], cycles: float) -> None:
+        if self.warned or not _half_spaces(self.contacts):
+            return
+        for notice in instability_warnings(self.contacts.faces(state), cycles):
+            self.warned = True
+            warnings.warn(ModelWarning(*notice), stacklevel=2)
+
+
+def _check_surfaces(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:
+    """Raise InputError unless a state has the gaps of ``unworn`` faces: functions have no digest.
+
+    Functions count by their names in the digests of a model.
     """
     pairs = zip(start.interfaces, unworn.interfaces, strict=False)
     if len(start.interfaces) != len(unworn.interfaces) or not all(
         np.array_equal(one.surfaces.initial_gap, other.surfaces.initial_gap) for one, other in pairs
     ):
-        raise InputError("the state to start from is of another model: its faces differ")
-    if start.solutions == 1 and not np.array_equal(
-        start.solved_resultants, unworn.solved_resultants
-    ):
-        raise InputError("the state to start from is of another model: its loads differ")
+        raise InputError("the state to start from is of another model: its gaps differ")

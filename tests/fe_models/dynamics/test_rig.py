@@ -132,6 +132,8 @@ def test_invalid_rigs_are_refused():
     with pytest.raises(RigError, match="different numbers of directions"):
         lumped_rig({"a": 1.0}, {}, [[Link("a")], [Link("a"), Link("a")]])
     stiffness, mass = bar(6)
+    with pytest.raises(RigError, match="to itself"):
+        Link("a", "a")
     with pytest.raises(RigError, match="no mass"):
         reduced_rig(reduce_body(stiffness, None, np.array([0, 6])), ("a", "b"), [])
     with pytest.raises(RigError, match="1 names for 2"):

@@ -71,7 +71,7 @@ def test_forms_end_where_they_must() -> None:
         (lambda: LogarithmicEvolution(0.2, -1.0), "rate = -1"),
         (lambda: ArrheniusEvolution(0.2, 0.0), "scale = 0"),
         (lambda: ExponentialEvolution(0.7, 0.3), "rate = 0.3"),
-        (lambda: ExponentialEvolution(0.7, -0.3, 0.5, 5.0), "second rate = 5"),
+        (lambda: ExponentialEvolution(0.7, -0.3, 0.5, 5.0), "second_rate = 5"),
         (lambda: TabulatedEvolution((), ()), "0 energies and 0 factors"),
         (lambda: TabulatedEvolution((1.0, 1.0), (1.0, 2.0)), "must ascend"),
     ],

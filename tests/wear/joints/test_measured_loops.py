@@ -359,6 +359,34 @@ def test_records_without_loops_are_refused():
             measure_loops(*wrong)
 
 
+@pytest.mark.parametrize(
+    ("lead", "reason"),
+    [
+        (85.0, "follows the velocity"),
+        (90.0, "follows the velocity"),
+        (95.0, "follows the velocity"),
+        (135.0, "falls where the displacement grows"),
+        (180.0, "falls where the displacement grows"),
+        (-90.0, "give energy"),
+        (-45.0, "give energy"),
+    ],
+)
+def test_loops_of_no_joint_are_refused_with_the_true_reason(lead, reason):
+    """A harmonic force that leads a harmonic motion by an angle from 0 to 180° dissipates."""
+    phase = 2.0 * np.pi * np.arange(600) / 200
+    with pytest.raises(MeasuredLoopError, match=reason):
+        measure_loops(0.01 * np.sin(phase), 10.0 * np.sin(phase + np.radians(lead)), LOAD)
+
+
+def test_a_spring_and_a_dashpot_lose_the_energy_of_an_ellipse():
+    """Up to a lead of 75° the loop is measured: π F x sin φ in a cycle."""
+    phase = 2.0 * np.pi * np.arange(3000) / 1000
+    for lead in np.radians([10.0, 45.0, 70.0]):
+        measured = measure_loops(0.01 * np.sin(phase), 10.0 * np.sin(phase + lead), LOAD)
+        assert measured.energy == pytest.approx(0.1 * np.pi * np.sin(lead), rel=1e-4)
+        assert measured.force == pytest.approx(10.0, rel=1e-3)
+
+
 def test_a_motion_that_is_not_harmonic_is_not_smoothed_away() -> None:
     """A joint sticks for 4 % of the cycle, in a rig whose 25th harmonic responds too."""
     law = Jenkins(stiffness=3e4, friction=0.1, normal_load=60.0)

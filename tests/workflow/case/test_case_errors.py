@@ -5,8 +5,12 @@ import re
 
 import pytest
 from click.testing import CliRunner
+from pydantic_core import PydanticCustomError
 
+from workflow.analyses.wear.case.base import check_interface_name
 from workflow.cli import cli
+from workflow.errors import CaseError
+from workflow.kinds import parse_case, template
 
 posix_only = pytest.mark.skipif(os.name != "posix", reason="pipes and devices of POSIX")
 
@@ -40,6 +44,7 @@ WRONG = [
     ("law: energy", "law: energy_amplitude", "wear.reference_amplitude"),
     ("kind: implicit}", "kind: implicit, cycles: 9, depth: 1 um}", "wear.step.depth"),
     ("kind: implicit}", "kind: explicit}", "wear.step.kind"),
+    ("kind: implicit}", "kind: implicit, cycles: 1}", "wear.step.cycles"),
     ("friction: {coefficient: 0.4}", "friction: 0.4", "friction"),
     ("- load_path", "- load_paths", "assumed.2"),
     ("blades: 24", "blades: 24\n  blades: 9", "'blades'"),
@@ -126,3 +131,14 @@ def test_folders_pipes_and_devices_are_refused_as_cases_and_tables(tmp_path):
 def test_wrong_override_is_named(dovetail_path, override):
     line = refusal(["check", str(dovetail_path), "--set", override])
     assert line.startswith(f"fretscale: --set {override}: ")
+
+
+def test_a_motion_without_end_is_refused():
+    with pytest.raises(CaseError, match=r"step=1e-12: .* time steps; allowed: at most"):
+        parse_case(template("rig"), "case.yaml", ["integration.step=1e-12"])
+
+
+@pytest.mark.parametrize("name", ["", " ", "a/b", ".", "..", "surfaces"])
+def test_a_contact_has_a_name_that_results_can_have(name):
+    with pytest.raises(PydanticCustomError, match="an interface called"):
+        check_interface_name(name, "contacts.0.name")

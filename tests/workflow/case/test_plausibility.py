@@ -52,6 +52,7 @@ SLIPS = [
     ("specimens", "load_path.stroke=14 mm", "load_path.stroke"),
     ("dovetail", "contact.grid=[512, 16]", "contact.grid"),
     ("dovetail", "wear.step.cycles=1e6", "wear.step.cycles"),
+    ("dovetail", "wear.step={kind: explicit, fraction: 5}", "wear.step.fraction"),
     ("dovetail", "load_path.aerodynamic_moment=30 kN*m", "load_path.aerodynamic_moment"),
     # Contacts and their grids, shear and friction.
     ("bodies", "contact.size=[1 m, 1 m]", "contact.size"),

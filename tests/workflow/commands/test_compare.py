@@ -96,6 +96,14 @@ def test_command_writes_text_table_page_and_curves(runs, tmp_path):
     assert (again.exit_code, "exists; give another folder, or --force" in again.stderr) == (2, True)
 
 
+def test_an_output_that_cannot_be_written_is_refused_before_anything_is_shown(runs, tmp_path):
+    file = tmp_path / "file"
+    file.write_text("not a folder", encoding="utf-8")
+    refused = invoke("compare", runs / "ball", runs / "rough", "--out", file)
+    assert (refused.exit_code, refused.stdout) == (2, "")
+    assert file.read_text("utf-8") == "not a folder"
+
+
 def test_a_program_compares_as_the_command_does(runs, tmp_path):
     balls = fretscale.compare(runs / "ball", fretscale.open(runs / "rough"), str(runs / "again"))
     assert balls.names == ("ball", "rough", "again")

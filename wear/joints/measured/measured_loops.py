@@ -59,6 +59,12 @@ GENERATING = 0.01
 stroke.
 """
 
+LEAST_RISE = 0.25
+"""The force of a joint is largest near the reversals. Below this share of its range from reversal
+to reversal it follows the velocity rather than the displacement: that of a spring and a dashpot
+that leads by more than 75°. The slope after a reversal is then no stiffness.
+"""
+
 NEAR_ZERO = 1e-12
 """Share of force times stroke below which an energy is rounding."""
 
@@ -259,8 +265,8 @@ def measure_loops(
     Raises
     ------
     wear.joints.measured.loop_record.MeasuredLoopError
-        If no loop closes, there are too few samples for anything but energies, or loops generate
-        energy.
+        If no loop closes, there are too few samples for anything but energies, loops generate
+        energy, or the force is not largest near the reversals.
 
     Examples
     --------
@@ -280,16 +286,12 @@ def measure_loops(
     record, pairs = closed_loops(loop_record(displacement, force, normal_load, time))
     energy = np.array([_energy(record, pair) for pair in pairs])
     sizes = np.array([_pair_means(record, pair) for pair in pairs])
-    box = 2.0 * sizes[:, 0] * sizes[:, 1]
-    if (box <= 0.0).all() or energy.sum() < -GENERATING * np.abs(box).sum():
-        raise MeasuredLoopError(
-            "the loops give energy instead of dissipating it; allowed: the force that resists the "
-            "displacement (change the sign of one of them)"
-        )
+    ranges = np.array([0.5 * np.ptp(record.force[_samples(pair)]) for pair in pairs])
+    box = 2.0 * sizes[:, 0] * ranges
+    _check_resisting(energy, box, sizes[:, 1], ranges)
     energy = np.where(np.abs(energy) > NEAR_ZERO * np.abs(box), energy, 0.0)
     # With a few samples per loop the outermost may lie on either branch: use the range of forces.
     noise = noise_along(record, [branch for pair in pairs for branch in pair])
-    ranges = np.array([0.5 * np.ptp(record.force[_samples(pair)]) for pair in pairs])
     sizes[:, 1] = np.maximum(sizes[:, 1], ranges - RANGE_NOISE * noise[1])
     loads = np.array([record.normal_load[_samples(pair)].mean() for pair in pairs])
     step = _assign_steps(record, pairs, sizes, energy, loads, noise)
@@ -320,6 +322,32 @@ def measure_loops(
         branches=pairs,
         record=record,
         resolution=resolution(record.displacement),
+    )
+
+
+def _check_resisting(energy: Array, box: Array, rises: Array, ranges: Array) -> None:
+    """Raise MeasuredLoopError unless loops dissipate, and resist the displacement at its reversals.
+
+    ``box`` ``(c,)`` is stroke times force, ``rises`` and ``ranges`` ``(c,)`` are half of the growth
+    of the force from reversal to reversal, and half of its range.
+    """
+    if energy.sum() < -GENERATING * np.abs(box).sum():
+        raise MeasuredLoopError(
+            "the loops give energy instead of dissipating it; allowed: the force that resists the "
+            "displacement (change the sign of one of them)"
+        )
+    if not (rises < LEAST_RISE * ranges).all():
+        return
+    share = 100.0 * float(rises.sum() / max(ranges.sum(), np.finfo(float).tiny))
+    if share < -100.0 * LEAST_RISE:
+        raise MeasuredLoopError(
+            "the force falls where the displacement grows; allowed: the force that resists the "
+            "displacement (change the sign of one of them), without forces of inertia"
+        )
+    raise MeasuredLoopError(
+        f"from reversal to reversal the force changes by only {share:.0f} % of its range: it "
+        "follows the velocity, as that of a dashpot does, and shows neither stick stiffness nor "
+        "friction; allowed: the force of a joint, largest near the reversals"
     )
 
 

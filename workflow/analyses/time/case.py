@@ -53,6 +53,7 @@ from workflow.case.sections import (
 )
 from workflow.case.text.plain import plain, times
 from workflow.messages.warning_kinds import Notice
+from workflow.models.checks.limits import MOST_TIME_STEPS
 
 StepError = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
 JumpError = Annotated[float, Quantity("1", at_least=1e-10, at_most=0.1)]
@@ -266,6 +267,18 @@ class RigCase(TimeCase):
             raise disagreement(
                 f"{self.integration.step:g} s: too long for the excitation; "
                 f"allowed: up to {longest:g} s",
+                "integration.step",
+                "integration",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _motion_ends(self) -> RigCase:
+        count = self.steps * getattr(self.excitation, "periods", 1)
+        if count > MOST_TIME_STEPS:
+            raise disagreement(
+                f"{self.integration.step:g} s: {count:.3g} time steps; allowed: at most "
+                f"{MOST_TIME_STEPS:.0e}, with a longer step or a shorter record",
                 "integration.step",
                 "integration",
             )

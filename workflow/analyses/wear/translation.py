@@ -88,4 +88,4 @@ def check_section(case: WearCase, face: ContactFace) -> None:
     try:
         case.stress.described().check(face.grid(case.terms(face.face.name).grid))
     except InputError as error:
-        raise UserError(str(error)) from error
+        raise UserError(f"stress.{error}") from error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -86,6 +86,11 @@ class WearingJoint:
     tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
+        checks.instances(self, law=LineLaw, evolution=JointEvolution)
+        for parameter in fields(self.law):
+            checks.number(
+                f"{parameter.name} of WearingJoint.law", getattr(self.law, parameter.name)
+            )
         checks.numbers(self, "stroke", "cycles", "energy", "tolerance", above=0.0)
         if (self.cycles is None) == (self.energy is None):
             raise InputError("a joint is driven for a number of cycles or to an energy: give one")
@@ -140,9 +145,10 @@ class WearingJoint:
 
         test = self.test()
         last = test.final_energy if self.energy is None else self.energy
-        if any(not 0.0 <= energy <= last for energy in energies):
+        wanted = checks.array("energies", energies, (None,))
+        if ((wanted < 0.0) | (wanted > last)).any():
             raise InputError(f"energies outside the test, which ends at {last:g} N mm")
-        states = np.array([*energies, last])
+        states = np.append(wanted, last)
         displacement, force, _ = zip(
             *(steady_loop(self.at(energy), self.amplitude) for energy in states.tolist()),
             strict=True,

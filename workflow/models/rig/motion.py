@@ -12,13 +12,15 @@ import numpy as np
 from fe_models.dynamics.excitation import ExcitationForce
 from fe_models.dynamics.motion import Motion, Start
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
-from wear.coupled_state import Observer, observed
+from wear.coupled_state import Observer, check_observers, observed
 from workflow.errors import MethodFailed, ModelWarning
 from workflow.layout.declared import declared
 from workflow.messages.warning_kinds import WarningKind
+from workflow.models.checks.limits import MOST_RECORDED, MOST_TIME_STEPS, check_count
 from workflow.models.rig.laws import Laws
 from workflow.models.rig.layout import CURVES
 from workflow.models.rig.rig_model import RigModel
@@ -78,6 +80,27 @@ class MotionModel:
     start: Start | None = None
 
     def __post_init__(self) -> None:
+        checks.instances(
+            self,
+            rig=RigModel,
+            law=Laws,
+            force=ExcitationForce,
+            control=TimeStepControl,
+            start=Start | None,
+        )
+        checks.numbers(self, "duration", above=0.0)
+        count, size = self.duration / self.control.step, len(self.rig.model.names)
+        longer = "give a longer step or a shorter duration"
+        check_count("time steps", count, MOST_TIME_STEPS, longer)
+        if self.control.every > np.ceil(count):
+            raise InputError(
+                f"a row every {self.control.every} of {np.ceil(count):g} time steps: none is "
+                "recorded after the first; give a smaller every"
+            )
+        recorded = count / self.control.every * size
+        check_count(
+            "recorded displacements", recorded, MOST_RECORDED, f"{longer}, or a larger every"
+        )
         longest = self.force.longest_step
         if self.control.step > (1.0 + ROUNDING) * longest:
             raise InputError(
@@ -129,13 +152,14 @@ class MotionModel:
         Warns
         -----
         ModelWarning
-            The time steps are too long for the motion.
+            The time steps are too long for the motion, or nothing moves.
 
         Raises
         ------
         MethodFailed
             The motion was not found to its end.
         """
+        check_observers(observers)
         import xarray as xr
 
         def reached(share: float) -> None:
@@ -150,6 +174,9 @@ class MotionModel:
                 "displacement: take shorter ones"
             )
             warnings.warn(ModelWarning(WarningKind.LONG_TIME_STEPS, text), stacklevel=2)
+        if not (motion.displacement.any() or self.force.value(motion.times).any()):
+            text = f"nothing moves: the force is 0 for all of the {self.duration:g} s"
+            warnings.warn(ModelWarning(WarningKind.NO_FORCE, text), stacklevel=2)
         curves, described = curves_of(self.rig, self.force, motion), declared(CURVES)
         return xr.Dataset(
             {name: described[name].variable(values) for name, values in curves.items()},

@@ -17,6 +17,8 @@ from fe_models.dynamics.motion import Motion
 from fe_models.dynamics.periodic.receptance import RIGID
 from fe_models.dynamics.rig import natural_frequencies, unit_force
 from fe_models.dynamics.rings.sector import CyclicSector
+from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Indices
 from wear.joints.elastic import ElasticLaw
 from wear.joints.friction_contact import FrictionContact
@@ -151,6 +153,23 @@ class RigModel:
         directions
             Directions of each joint: 1, or 3 for contacts.
         """
+        if not isinstance(model, DynamicModel):
+            raise InputError(f"model is {checks.shown(model)}: give a DynamicModel")
+        if not isinstance(driven, Mapping) or not driven:
+            raise InputError(
+                f"driven is {checks.shown(driven)}: give forces by the names of displacements"
+            )
+        if not isinstance(observed, list | tuple) or not observed:
+            raise InputError(
+                f"observed is {checks.shown(observed)}: give a list of names, the main one last"
+            )
+        for name, force in driven.items():
+            checks.number(f"the force on {name}", force)
+        rows = len(model.connection)
+        if checks.whole("directions", directions) not in (1, 3) or rows % directions:
+            raise InputError(
+                f"directions = {directions} of {rows} rows of joints: give 1, or 3 for contacts"
+            )
         forces = np.sum([force * unit_force(model, name) for name, force in driven.items()], axis=0)
         seen = np.array([unit_force(model, name) for name in observed])
         return cls(model, forces, seen, tuple(observed), directions)
@@ -242,6 +261,8 @@ class RigModel:
         Both are along the direction number ``along``.
         """
         stretch, force, shared = motion.joint_displacement, motion.joint_force, self.shared
+        if not shared.any():
+            return np.zeros(len(force)), np.zeros(len(force))
         pulled = force[:, shared, self.along].sum(axis=1)
         return stretch[:, shared, self.along].mean(axis=1), pulled
 

@@ -14,12 +14,13 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array, unseen
-from wear.coupled_state import Observer
+from wear.coupled_state import Observer, check_observers
 from wear.laws import WearLaw
 from wear.steps.marching import rest
 from wear.steps.steppers import ExplicitStepper
 from workflow.errors import MethodFailed, TooCoarse, UserError
 from workflow.layout.declared import declared
+from workflow.models.contact import check_two_laws
 from workflow.models.specimens.reduced import ReducedSpecimens, SpecimenPair
 from workflow.models.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
 from workflow.models.structure_model import StructureStore
@@ -100,6 +101,8 @@ class FrettedSpecimens:
     block: float | None = None
 
     def __post_init__(self) -> None:
+        checks.instances(self, specimens=SpecimenPair, conditions=FrettingConditions)
+        check_two_laws(self.laws)
         checks.numbers(self, "cycles", "energy", "block", above=0.0)
         checks.numbers(self, "fraction", above=0.0, most=1.0)
         if self.specimens.target_distance is not None:
@@ -136,6 +139,7 @@ class FrettedSpecimens:
         UserError
             The run would not come to an end.
         """
+        check_observers(observers)
         pair = self.specimens
         reduced = pair.reduced if store is None else ReducedSpecimens(pair, store)
         reduced.prepare(unseen)
@@ -186,24 +190,24 @@ class FrettedSpecimens:
         if not contact.converged:
             raise MethodFailed(
                 f"contact at {force} did not converge after {state.cycles:.4g} cycles; change "
-                "mesh.pad_elements or lower wear.step.fraction"
+                "pad_elements or lower the fraction of a block"
             )
         if self.energy is not None and contact.energy == 0.0:
             raise UserError(
-                f"wear.energy: nothing slides at {force}, so this energy is never dissipated: "
-                "raise load_path.stroke or friction.coefficient, or give wear.cycles"
+                f"energy: nothing slides at {force}, so this energy is never dissipated: raise the "
+                "stroke or the friction, or give cycles"
             )
         if state.wear.any() and np.isinf(state.stable_cycles):
             raise TooCoarse(
-                f"mesh.pad_elements: only one node of the pad touches at {force}, too few to wear: "
-                "raise it, or load_path.normal_forces"
+                f"pad_elements: only one node of the pad touches at {force}, too few to wear: "
+                "raise it, or the normal force"
             )
         # Number of blocks of the run if all are as long as the first one.
         needed = state.number or self._to_go(state) / self._block(state)
         if needed > MOST_BLOCKS:
             raise UserError(
-                f"wear: more than {MOST_BLOCKS} cycle blocks at {force}: lower the wear "
-                "coefficients, the cycles or the energy, or lengthen wear.step"
+                f"more than {MOST_BLOCKS} cycle blocks at {force}: lower the wear coefficients, "
+                "the cycles or the energy, or lengthen the blocks"
             )
 
 

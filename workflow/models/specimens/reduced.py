@@ -66,11 +66,11 @@ class SpecimenPair:
     target_distance: float | None = None
 
     def __post_init__(self) -> None:
-        checks.numbers(self, "size", above=0.0)
-        checks.numbers(self, "modes", least=1)
-        checks.whole("modes", self.modes)
-        if self.order not in (1, 2):
-            raise InputError(f"order is {self.order!r}: give 1 or 2")
+        checks.instances(self, specimen=Specimen, added=AddedGap | None)
+        checks.numbers(self, "size", "target_distance", above=0.0)
+        checks.wholes(self, "modes", least=1)
+        checks.wholes(self, "order", least=1, most=2)
+        checks.members(self, materials=Material)
         if len(self.materials) != 2 or not all(body.density > 0.0 for body in self.materials):
             raise InputError("materials: give two, each with a density above 0")
 

@@ -8,6 +8,7 @@ from typing import Literal
 from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Grid
+from workflow.models.checks.limits import MOST_POINTS
 
 SECTIONS = "x", "y", "none"
 PARAMETERS = "ruiz", "smith_watson_topper", "findley", "none"
@@ -57,14 +58,12 @@ class Stress:
     sensitivity: float = 0.3
 
     def __post_init__(self) -> None:
-        checks.choice("section", self.section, SECTIONS)
-        checks.choice("parameter", self.parameter, PARAMETERS)
+        checks.choices(self, section=SECTIONS, parameter=PARAMETERS)
         checks.numbers(self, "at")
         checks.numbers(self, "critical_distance", above=0.0)
         checks.numbers(self, "depth", above=self.critical_distance)
         checks.numbers(self, "sensitivity", least=0.0)
-        if checks.whole("points", self.points) < 2:
-            raise InputError(f"points = {self.points}: give 2 or more")
+        checks.wholes(self, "points", least=2, most=MOST_POINTS)
 
     @property
     def under_contacts(self) -> bool:
@@ -76,12 +75,10 @@ class Stress:
         if self.section == "none":
             return
         if self.section == "y" and grid.line:
-            raise InputError(
-                "stress.section: y: a line contact has no length along y; allowed: x, none"
-            )
+            raise InputError("section: y: a line contact has no length along y; allowed: x, none")
         reach = 0.5 * grid.size[1 if self.section == "x" else 0]
         if abs(self.at) > reach:
             raise InputError(
-                f"stress.at: {self.at:g} mm is outside the contact's grid; allowed: {-reach:.4g} "
+                f"at: {self.at:g} mm is outside the contact's grid; allowed: {-reach:.4g} "
                 f"to {reach:.4g} mm"
             )

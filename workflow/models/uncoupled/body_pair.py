@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,12 +16,14 @@ from sa_solver.ties import SAME, first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads
+from workflow.models.checks.names import check_face_name
 from workflow.models.contact import Contact, gap_on
 from workflow.models.gaps import GapFunction
 from workflow.models.loads import (
     COARSER,
     ContactFace,
     UncoupledSource,
+    check_size,
     coarse_cells,
     nominal_face,
 )
@@ -87,11 +89,10 @@ class BodyPair:
     remedy: str = "enlarge its size, and the grid of the contact with it"
 
     def __post_init__(self) -> None:
-        checks.choice("tilt", self.tilt, ("held", "free"))
-        if not callable(self.gap):
-            raise InputError("gap is no function: give one that returns the distance at x and y")
-        if not isinstance(self.loads, LoadTable):
-            raise InputError(f"loads are {self.loads!r}: give a LoadTable")
+        checks.choices(self, tilt=("held", "free"))
+        checks.instances(self, gap=Callable, loads=LoadTable, line=bool, remedy=str)
+        check_face_name(self.name)
+        check_size("BodyPair.size", self.size, self.line)
         if problem := conflict(self.loads.columns):
             raise InputError(f"loads of two bodies: {': '.join(problem)}")
         if (force := self.loads["P"].min()) < 0.0:

@@ -15,6 +15,9 @@ from sa_solver.types import Array, LoadHistory
 from wear.contact.face_loads import CycleLoads
 from workflow.models.loads import ContactFace, UncoupledSource, UserFace
 
+# Kinds of a face and of its loads.
+PAIR = ContactFace, CycleLoads | LoadHistory
+
 
 @dataclass(frozen=True)
 class GivenLoads(UncoupledSource):
@@ -56,6 +59,18 @@ class GivenLoads(UncoupledSource):
     user_nodes: Sequence[Sequence[UserFace]] = ()
 
     def __post_init__(self) -> None:
+        checks.members(self, pairs=list | tuple, user_nodes=list | tuple)
+        if len(self.user_nodes) not in (0, len(self.pairs)):
+            raise InputError(
+                f"GivenLoads.user_nodes has {len(self.user_nodes)} entries for {len(self.pairs)} "
+                "faces: give one for each, or none"
+            )
+        for pair in self.pairs:
+            if [isinstance(part, of) for part, of in zip(pair, PAIR, strict=False)] != [True, True]:
+                raise InputError(
+                    f"GivenLoads.pairs has {checks.shown(pair)}: give a ContactFace with its "
+                    "CycleLoads or LoadHistory"
+                )
         names = [face.face.name for face, _ in self.pairs]
         lengths = {len(_history(loads)) for _, loads in self.pairs}
         if not names or len(set(names)) < len(names):
@@ -68,6 +83,8 @@ class GivenLoads(UncoupledSource):
             raise InputError("some faces are line contacts, others are not: give one kind")
         for face, loads in self.pairs:
             history, name = _history(loads), face.face.name
+            checks.array(f"resultants of {name}", history.resultants, (None, 6))
+            checks.array(f"energies of {name}", [history.Edx, history.Edy], (2, None))
             if (force := history.P.min()) < 0.0:
                 raise InputError(f"{name}: P = {force:g} N pulls the bodies apart: give 0 or more")
             if isinstance(loads, CycleLoads):
@@ -87,6 +104,11 @@ class GivenLoads(UncoupledSource):
     def slip_known(self) -> bool:  # type: ignore[override]
         """True if the loads of a face include the slips of its nodes."""
         return any(isinstance(loads, CycleLoads) for _, loads in self.pairs)
+
+    @property
+    def without_slip(self) -> list[str]:
+        """Names of the faces whose loads do not include the slips of their nodes."""
+        return [face.face.name for face, loads in self.pairs if not isinstance(loads, CycleLoads)]
 
     @cached_property
     def peak(self) -> int:  # type: ignore[override]

@@ -12,6 +12,7 @@ import numpy as np
 from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Material, Tilt
+from workflow.models.checks.limits import MOST_INCREMENTS
 
 FORCES = ("P", "Qx", "Qy", "Mx", "My", "Mz")
 # Rigid motions conjugate to the forces, in the same order.
@@ -59,6 +60,7 @@ class LoadTable:
     columns: Mapping[str, Array]
 
     def __post_init__(self) -> None:
+        checks.instances(self, columns=Mapping)
         if unknown := sorted(self.columns.keys() - {*FORCES, *MOTIONS, *BULK_STRESSES}):
             known = ", ".join((*FORCES, *MOTIONS, *BULK_STRESSES))
             raise InputError(f"loads {', '.join(unknown)} are unknown: give {known}")
@@ -94,6 +96,9 @@ class LoadTable:
             Direction of the stroke, from x to y [rad].
         """
         _require_increments(increments)
+        checks.number("P", P)
+        checks.number("stroke", stroke)
+        checks.number("direction [rad]", direction)
         step = stroke / increments * np.array([np.cos(direction), np.sin(direction)])
         there = np.tile(step, (increments, 1))
         path = np.cumsum(np.concatenate([there, -there]), axis=0)
@@ -119,12 +124,16 @@ class LoadTable:
         closed : bool
             Whether the first leg begins where the last one ends, as in a cycle; else at 0.
         """
+        if not isinstance(targets, Mapping) or not isinstance(increments, list | tuple):
+            raise InputError("legs: give targets by the names of columns, and a list of increments")
+        if not isinstance(closed, bool):
+            raise InputError(f"closed is {checks.shown(closed)}: give True or False")
         _require_increments(*increments)
         if any(len(ends) != len(increments) for ends in targets.values()):
             raise InputError(f"{len(increments)} legs: give as many targets of every column")
         columns = {}
         for name, ends in targets.items():
-            given = [end for end in ends if end is not None]
+            given = [checks.number(f"a target of {name}", end) for end in ends if end is not None]
             if not given:
                 continue
             start = given[-1] if closed else 0.0
@@ -196,8 +205,7 @@ class LoadTable:
 def _require_increments(*counts: int) -> None:
     """Raise InputError unless every count of increments is a whole number of 1 or more."""
     for count in counts:
-        if checks.whole("a number of increments", count) < 1:
-            raise InputError(f"a leg of {count} increments is not possible: give 1 or more")
+        checks.whole("the number of increments of a leg", count, least=1, most=MOST_INCREMENTS)
 
 
 def conflict(named: Container[str]) -> tuple[str, str] | None:

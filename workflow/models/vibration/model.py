@@ -9,8 +9,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from fe_models.dynamics.periodic.harmonics import Resolution
+from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.steps import COMPUTED, Steps
-from wear.coupled_state import Observer, observed
+from wear.coupled_state import Observer, check_observers, observed
 from workflow.errors import ModelWarning
 from workflow.models.rig.laws import Laws
 from workflow.models.rig.rig_model import RigModel
@@ -76,6 +78,29 @@ class VibrationModel:
     driving: Driving | None = None
     normal_load: float = 0.0
 
+    def __post_init__(self) -> None:
+        checks.instances(
+            self,
+            rig=RigModel,
+            law=Laws,
+            sweep=FrequencySweep,
+            resolution=Resolution,
+            driving=Driving | None,
+        )
+        forces = checks.array("VibrationModel.forces", self.forces, (None,))
+        if not len(forces) or not (forces > 0.0).all():
+            raise InputError(
+                f"VibrationModel.forces is {checks.shown(self.forces)}: give one or more, each "
+                "above 0"
+            )
+        checks.settle(self, forces=tuple(forces.tolist()))
+        checks.numbers(self, "normal_load", least=0.0)
+        if self.normal_load and self.rig.pressing is None:
+            raise InputError(
+                f"VibrationModel.normal_load = {self.normal_load:g} N: the rig has no two bodies "
+                "that it presses together; give the load to the law of the joints"
+            )
+
     @cached_property
     def structure(self) -> VibratingStructure:
         """The rig with its joints and its excitation, ready to be solved."""
@@ -131,9 +156,15 @@ class VibrationModel:
         MethodFailed
             The joints do not balance the static load, or there is no motion under a force.
         """
+        check_observers(observers)
+        names = list(map(self.structure.driving.amount.as_text, self.forces))
+        if len(set(names)) < len(names):
+            raise InputError(
+                f"VibrationModel.forces are {', '.join(names)}, which are names of results: give "
+                "each once"
+            )
         responses = {}
-        for force in self.forces:
-            name = self.structure.driving.amount.as_text(force)
+        for name, force in zip(names, self.forces, strict=True):
             with observed(observers, name):
                 responses[name] = self.response(force, steps, observers)
             for kind, text in responses[name].faults(self.sweep.accuracy):

@@ -11,6 +11,7 @@ from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.forced_response import ResponseBranch, along_frequency
 from fe_models.dynamics.curves.motion_recorder import Accuracy
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from workflow.errors import MethodFailed
@@ -51,6 +52,11 @@ class FrequencySweep:
     upward: bool = True
     accuracy: Accuracy | None = None
     control: ContinuationControl = field(default_factory=lambda: ContinuationControl(most=0.1))
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "lower", above=0.0)
+        checks.numbers(self, "upper", above=self.lower)
+        checks.instances(self, upward=bool, accuracy=Accuracy | None, control=ContinuationControl)
 
     @property
     def span(self) -> tuple[float, float]:

@@ -12,6 +12,7 @@ including its memory order.
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import pairwise
@@ -59,7 +60,7 @@ def resumable_steps(run: Run[Any]) -> Iterator[RunSteps]:
     steps.report()
 
 
-class StoredSteps:
+class StoredSteps(ABC):
     """Steps whose results are stored: see :class:`sa_solver.steps.Steps`.
 
     A subclass saves them. ``kept`` are the results of earlier steps, and ``marches`` the states
@@ -110,25 +111,25 @@ class StoredSteps:
         self._cost = self._saved - begun
 
     # -- of a subclass ------------------------------------------------------------------------
+    @abstractmethod
     def _write(self) -> None:
         """Write the results that are not saved yet."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _of_another_version(self, wrong: object) -> UserError:
         """Return the error about stored steps that are not those of this run."""
-        raise NotImplementedError
 
-    def _compute(self) -> None:
+    def _compute(self) -> None:  # noqa: B027 - a run need not know
         """Handle that the next step is computed and not restored."""
 
     def _warnings(self) -> list[str]:
         """Return the warnings so far; those of a step are stored with it."""
         return []
 
-    def _repeat(self, line: str) -> None:
+    def _repeat(self, line: str) -> None:  # noqa: B027 - without warnings
         """Repeat a warning of a restored step."""
 
-    def _spend(self, seconds: float) -> None:
+    def _spend(self, seconds: float) -> None:  # noqa: B027 - a run need not know
         """Count the seconds that storing a step has taken."""
 
     # -- places -------------------------------------------------------------------------------

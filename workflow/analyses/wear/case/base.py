@@ -28,6 +28,8 @@ from workflow.case.plausibility import idle_steps, uneven_cells
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 from workflow.case.text.plain import entries, of_bodies, plain, shares, times
 from workflow.messages.warning_kinds import Notice
+from workflow.models.checks.limits import unstable_fraction
+from workflow.models.checks.names import is_group_name
 
 # Names of the entries of summary and results, which interfaces must not have.
 RESERVED = (
@@ -41,9 +43,9 @@ EXPECTED_INCREMENTS, MOST_INCREMENTS = 11, 1000
 
 def check_interface_name(name: str, key: str) -> None:
     """Refuse, at ``key``, an interface whose name cannot be used in the results."""
-    if name in RESERVED or "/" in name:
+    if name in RESERVED or not is_group_name(name):
         raise disagreement(
-            f"an interface called {shown(name)}; allowed: names without /, other than "
+            f"an interface called {shown(name)}; allowed: a name without /, other than "
             f"{', '.join(RESERVED)}",
             key,
         )
@@ -211,6 +213,8 @@ class WearCase(WithScans, Case):
 
     def plausibility_warnings(self) -> Iterator[Notice]:
         yield from idle_steps("wear.step.cycles", self.wear.step.cycles, self.wear.cycles)
+        for kind, text in unstable_fraction(self.wear.step.fraction):
+            yield Notice(kind, f"wear.step.fraction: {text}")
         if (sides := self.face_sides()) is not None:
             yield from uneven_cells(sides, self.contact.grid)
 

@@ -27,6 +27,7 @@ from workflow.case.sections import (
     entry,
 )
 from workflow.case.text.plain import plain, shares, times
+from workflow.models.checks.limits import MOST_JUMPS, MOST_POINTS
 
 if TYPE_CHECKING:
     from workflow.models import structure_model
@@ -219,6 +220,18 @@ class Duration(Section):
     )
     stop: StopSection = entry("ends the run early", default=StopSection())
 
+    @model_validator(mode="after")
+    def _jumps_end(self) -> Duration:
+        least = self.cycles / MOST_JUMPS
+        if self.step.cycles is not None and self.step.cycles < least:
+            raise disagreement(
+                f"{self.step.cycles:g}: {self.cycles / self.step.cycles:.3g} jumps; "
+                f"allowed: {least:g} cycles or more, which makes {MOST_JUMPS} jumps",
+                "step.cycles",
+                "cycles",
+            )
+        return self
+
     @property
     def step_size(self) -> str:
         """Size of a wear step, with the number of jumps where it is known beforehand."""
@@ -374,7 +387,7 @@ class ContactStress(Section):
         "position of the plane on the other axis, from the middle [mm]", "0 mm", default=0.0
     )
     depth: Length = entry("depth of the plane [mm]", "2 mm", default=2.0)
-    points: Annotated[int, Whole(2, 1000)] = entry(
+    points: Annotated[int, Whole(2, MOST_POINTS)] = entry(
         "number of points over the depth, denser towards the surface", 24, default=24
     )
     life: Life = entry("fretting life: where cracks would start", default=Life())

@@ -20,6 +20,13 @@ from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
 from workflow.messages.warning_kinds import WarningKind
+from workflow.models.checks.warnings import (
+    dissimilar_warnings,
+    growth_warnings,
+    instability_warnings,
+    open_warnings,
+    yield_warnings,
+)
 from workflow.models.contact import FaceContact, WornFaces, border_warnings
 from workflow.models.loads import LoadSource
 from workflow.models.structure import StructureLoads
@@ -69,15 +76,10 @@ def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: 
             "nonlinearity.stiffness",
         )
     for history in unworn.histories:
-        name, P = history.interface.name, history.loads.P
-        if P.max() <= 0.0:
-            reporter.warn(WarningKind.FACE_OPEN, f"{name} is never closed: it does not wear")
-        elif P[stage.peak] <= 0.0:
-            reporter.warn(
-                WarningKind.FACE_OPEN,
-                f"{name} is open at peak load: there is no pressure and no stress to show there",
-            )
-        else:
+        P = history.loads.P
+        for notice in open_warnings(history.interface.name, P, stage.peak):
+            reporter.warn(*notice)
+        if P[stage.peak] > 0.0:
             _warn_of_few_nodes(history, stage, reporter)
             _warn_of_form(history, stage, reporter)
 
@@ -157,30 +159,15 @@ def warn_of_contact(
     Raises UserError if a contact has too few cells.
     """
     stages = [stage for stage, _ in faces]
-    unlike = [stage.pair for stage in stages if not stage.pair.similar]
-    if case.contact.method == "normal" and unlike:
-        pair = max(unlike, key=lambda pair: abs(pair.dundurs_beta))
-        linked = all(result.link.corrects for result in first)
-        has = "resolves only as far as the mesh does" if linked else "neglects"
-        reporter.warn(
-            WarningKind.DISSIMILAR_NEGLECTED,
-            f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}), so shear moves the "
-            f"surfaces normally, which contact.method: normal {has}: use full",
-        )
-    for notice in border_warnings(stages, first):
+    if not isinstance(source, StructureLoads):
+        _warn_of_open(stages, first, source.peak, reporter)
+    for notice in (*dissimilar_warnings(stages, first), *border_warnings(stages, first)):
         reporter.warn(*notice)
     for (stage, state), result in zip(faces, first, strict=True):
-        terms = case.terms(stage.name)
-        yield_stress = min(material.yield_stress for material in terms.materials)
         if case.contact.method != "nodes":
             report_link(stage.name, result.link, stage.grid.line, reporter)
-        highest = result.pressure.max()
-        if highest > yield_stress:
-            reporter.warn(
-                WarningKind.PRESSURE_ABOVE_YIELD,
-                f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
-                f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there",
-            )
+        for notice in yield_warnings(stage, result):
+            reporter.warn(*notice)
         if case.contact.method == "nodes":
             continue  # the grid only shows them
         if reason := _energies_differ(source, stage, state.loads, result):
@@ -188,6 +175,15 @@ def warn_of_contact(
         settings, pressure = case.contact_of(stage.name), result.pressure[source.peak]
         check_cells(stage.name, settings, stage.grid, pressure, reporter)
         for notice in structure_of(case).warnings(case, stage, float(state.loads.P[source.peak])):
+            reporter.warn(*notice)
+
+
+def _warn_of_open(
+    stages: Sequence[FaceContact], first: Sequence[FirstContact], peak: int, reporter: Reporter
+) -> None:
+    """Warn of half-space contacts that carry nothing, or nothing at peak load."""
+    for stage, result in zip(stages, first, strict=True):
+        for notice in open_warnings(stage.name, result.pressure.sum(axis=(1, 2)), peak):
             reporter.warn(*notice)
 
 
@@ -232,21 +228,14 @@ def _work_of_sliding(stage: FaceContact, loads: LoadHistory) -> float:
 
 def warn_of_instability(faces: WornFaces, cycles: float, reporter: Reporter) -> None:
     """Warn of explicit steps with more cycles than is stable."""
-    stable = min(stage.contact.stable_cycles(state) for stage, state in faces)
-    if cycles > stable:
-        reporter.warn(
-            WarningKind.UNSTABLE_STEPS,
-            f"explicit wear steps above {stable:.3g} cycles amplify the roughness of the grid: "
-            "use implicit or smaller steps (wear.step)",
-        )
+    for notice in instability_warnings(faces, cycles):
+        reporter.warn(*notice)
 
 
 def warn_of_growth(faces: WornFaces, reporter: Reporter) -> None:
     """Warn of half-space contacts that have worn up to the border of their grid."""
-    for stage, state in faces:
-        worn = state.surfaces.depth
-        if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
-            reporter.warn(*stage.border_warning)
+    for notice in growth_warnings(faces):
+        reporter.warn(*notice)
 
 
 def warn_of_many_jumps(

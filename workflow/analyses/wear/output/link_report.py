@@ -6,7 +6,7 @@ from typing import Any
 
 from wear.contact.link import StructureLink
 from workflow.case.text.readable import percent
-from workflow.messages.warning_kinds import WarningKind
+from workflow.models.checks.warnings import link_warnings
 from workflow.shell.terminal.reporter import Reporter
 
 
@@ -44,15 +44,5 @@ def report_link(name: str, link: StructureLink, line: bool, reporter: Reporter) 
         f"polynomials {fit}, with errors of {percent(misfit)} (smooth) and {percent(graininess)} "
         "(grainy)"
     )
-    if link.coarse:
-        why = (
-            "the mesh is too coarse"
-            if link.grainy
-            else "the deformation changes within fewer nodes than a fit can follow"
-        )
-        reporter.warn(
-            WarningKind.UNCERTAIN_LINK,
-            f"{name}: the link to the structure has errors of {percent(misfit)} (smooth) and "
-            f"{percent(graininess)} (grainy) of the deformation of half-spaces, and pressures may "
-            f"be wrong by as much: {why}; refine the mesh of the contact face",
-        )
+    for notice in link_warnings(name, link):
+        reporter.warn(*notice)

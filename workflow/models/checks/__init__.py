@@ -1,0 +1,1 @@
+"""Checks of models: names, limits on the length of runs, states to resume from, and warnings."""

@@ -1,0 +1,166 @@
+"""Warnings about results that may be wrong though all solvers converge, for models and cases.
+
+Each function has one judgement. Models warn of them as :class:`workflow.errors.ModelWarning`, and
+runs of cases in their log and report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array, Material
+from wear.contact.interface import FirstContact, InterfaceContact
+from wear.contact.link import StructureLink
+from wear.coupled_state import CoupledState
+from workflow.messages.warning_kinds import Notice, WarningKind
+from workflow.models.checks.limits import USUAL_FRICTION
+from workflow.models.contact import FaceContact, WornFaces
+
+LARGEST_CHANGE = 0.5
+"""Largest relative change of friction within a wear jump. Where it falls to 0.5 within the first
+jump of a ball, the energy is too low by 0.4 %; where it falls to 0.01, by 44 %.
+"""
+
+
+def friction_warnings(stages: Sequence[FaceContact]) -> Iterator[Notice]:
+    """Yield the warnings for contacts whose coefficient of friction is unusual."""
+    low, high = USUAL_FRICTION
+    for stage in stages:
+        friction = stage.settings.friction(0.0)
+        if friction > 0.0 and not low <= friction <= high:
+            yield Notice(
+                WarningKind.UNUSUAL_VALUE,
+                f"{stage.name}: the coefficient of friction is {friction:g}; usual: {low:g} to "
+                f"{high:g}",
+            )
+
+
+def friction_step_warnings(
+    stages: Sequence[FaceContact], first: Sequence[FirstContact], state: CoupledState[Any]
+) -> Iterator[Notice]:
+    """Yield the warnings for contacts whose friction changes too much within one wear jump.
+
+    A step has the friction at its end: what the friction was within it is lost, and steps of twice
+    the length, which estimate the error, lose it too.
+    """
+    for stage, found, energy in zip(stages, first, state.kinetics[:, :, -1].T, strict=True):
+        begun = float(found.energy.sum())
+        if state.cycles[-1] >= 1.0 and energy[-1] < 0.5 * begun:
+            yield Notice(
+                WarningKind.FRICTION_CHANGES,
+                f"{stage.name}: the whole run dissipates {energy[-1]:.3g} N mm, its first cycle "
+                f"{begun:.3g}: friction vanishes within the first step; give smaller jumps",
+            )
+            continue
+        friction = np.array([stage.settings.friction(float(e)) for e in energy])
+        largest = np.maximum(friction[1:], friction[:-1])
+        change = np.abs(np.diff(friction)) / np.where(largest > 0.0, largest, 1.0)
+        if change.max(initial=0.0) > LARGEST_CHANGE:
+            jump = int(np.argmax(change))
+            before, after = friction[jump : jump + 2]
+            yield Notice(
+                WarningKind.FRICTION_CHANGES,
+                f"{stage.name}: friction changes from {before:.3g} to {after:.3g} within the wear "
+                f"jump to {state.cycles[jump + 1]:.3g} cycles, too fast for it: energy and wear "
+                "may be wrong; give smaller jumps",
+            )
+
+
+def open_warnings(name: str, carried: Array, peak: int) -> Iterator[Notice]:
+    """Yield the warning for a contact that carries nothing at all, or nothing at ``peak`` load.
+
+    ``carried`` ``(t,)`` is the load of every increment in any unit.
+    """
+    if carried.max() <= 0.0:
+        yield Notice(WarningKind.FACE_OPEN, f"{name} is never closed: it does not wear")
+    elif carried[peak] <= 0.0:
+        yield Notice(
+            WarningKind.FACE_OPEN,
+            f"{name} is open at peak load: there is no pressure and no stress to show there",
+        )
+
+
+def dissimilar_warnings(
+    stages: Sequence[FaceContact], first: Sequence[FirstContact]
+) -> Iterator[Notice]:
+    """Yield the warning for slips of the loads on dissimilar bodies."""
+    unlike = [
+        stage.pair
+        for stage in stages
+        if isinstance(stage.contact, InterfaceContact)
+        and stage.settings.method == "normal"
+        and not stage.pair.similar
+    ]
+    if not unlike:
+        return
+    pair = max(unlike, key=lambda pair: abs(pair.dundurs_beta))
+    linked = all(found.link.corrects for found in first)
+    has = "resolves only as far as the mesh does" if linked else "neglects"
+    yield Notice(
+        WarningKind.DISSIMILAR_NEGLECTED,
+        f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}), so shear moves the "
+        f"surfaces normally, which method normal of the contact {has}: use full",
+    )
+
+
+def yield_warnings(stage: FaceContact, first: FirstContact) -> Iterator[Notice]:
+    """Yield the warning for a pressure above the yield stress."""
+    highest = float(first.pressure.max())
+    limit = min(body.yield_stress for body in (stage.pair.body_1, stage.pair.body_2))
+    if highest > limit:
+        yield Notice(
+            WarningKind.PRESSURE_ABOVE_YIELD,
+            f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
+            f"{limit:.0f} MPa: the elastic solution is no longer valid there",
+        )
+
+
+def link_warnings(name: str, link: StructureLink) -> Iterator[Notice]:
+    """Yield the warning for an uncertain link of a contact to its structure."""
+    if not link.corrects or not link.coarse:
+        return
+    _, misfit, graininess = link.quality.tolist()
+    why = (
+        "the mesh is too coarse"
+        if link.grainy
+        else "the deformation changes within fewer nodes than a fit can follow"
+    )
+    yield Notice(
+        WarningKind.UNCERTAIN_LINK,
+        f"{name}: the link to the structure has errors of {100.0 * misfit:.2g} % (smooth) and "
+        f"{100.0 * graininess:.2g} % (grainy) of the deformation of half-spaces, and pressures may "
+        f"be wrong by as much: {why}; refine the mesh of the contact face",
+    )
+
+
+def instability_warnings(faces: WornFaces, cycles: float) -> Iterator[Notice]:
+    """Yield the warning for explicit steps of more ``cycles`` than is stable."""
+    stable = min(stage.contact.stable_cycles(state) for stage, state in faces)
+    if cycles > stable:
+        yield Notice(
+            WarningKind.UNSTABLE_STEPS,
+            f"explicit wear steps above {stable:.3g} cycles amplify the roughness of the grid: use "
+            "implicit or smaller steps",
+        )
+
+
+def growth_warnings(faces: WornFaces) -> Iterator[Notice]:
+    """Yield the warnings for half-space contacts that have worn up to the border of their grid."""
+    for stage, state in faces:
+        worn = state.surfaces.depth
+        if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
+            yield stage.border_warning
+
+
+def weightless_warnings(bodies: Mapping[str, Material]) -> Iterator[Notice]:
+    """Yield the warnings for ``bodies`` without density that rotation or acceleration loads."""
+    for name, material in bodies.items():
+        if material.density == 0.0:
+            yield Notice(
+                WarningKind.NO_DENSITY,
+                f"{name} has no density, so the forces of its own mass under rotation or "
+                "acceleration are missing: give its material one",
+            )
