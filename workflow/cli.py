@@ -132,7 +132,7 @@ def report(folder: Path, out: Path | None) -> None:
     help="Folder for the runs, one inside it for each case.",
 )
 @_loud
-def verify(cases: tuple[Path, ...], out: Path, loudness: str | None) -> int:
+def verify(cases: tuple[Path, ...], out: Path, loudness: str | None) -> None:
     """Run CASES and compare with what they expect."""
     from workflow.runs.verify import verify_cases
 
@@ -142,7 +142,8 @@ def verify(cases: tuple[Path, ...], out: Path, loudness: str | None) -> int:
         raise KeyboardInterrupt(
             f"{out} is not complete; start again with the same command"
         ) from stop
-    return errors.DONE if met else errors.ExpectationMissed.exit_code
+    if not met:
+        raise errors.ExpectationMissed("a result is outside the tolerance of what its case expects")
 
 
 @cli.command()
@@ -194,7 +195,7 @@ def chart(
     quantities: tuple[str, ...],
     accuracy: str,
     loudness: str | None,
-) -> int:
+) -> None:
     """Chart error against cost for what CASE approximates.
 
     Each AXIS has a ladder of runs about the settings of CASE: grid, tolerance, method, stepper,
@@ -223,7 +224,8 @@ def chart(
         show(charted)
         for line in look_at(out, reported):
             click.echo(line)
-    return errors.DONE if charted.complete else errors.MethodFailed.exit_code
+    if not charted.complete:
+        raise errors.RunsFailed(f"{out}: some runs failed; the chart is of the others")
 
 
 @cli.command()
@@ -242,7 +244,7 @@ def sweep(
     dask: str | None,
     force: bool,
     loudness: str | None,
-) -> int:
+) -> None:
     """Run a case many times with other values, as SWEEP says.
 
     SWEEP is a YAML file with the `case`, what to `vary` and the `design`: grid, zip or sample. All
@@ -259,7 +261,8 @@ def sweep(
     reported = _loudness(loudness)
     with _repeatable(out):
         done = run_sweep(file, out, processes=processes, dask=dask, force=force, loudness=reported)
-    return errors.DONE if done else errors.MethodFailed.exit_code
+    if not done:
+        raise errors.RunsFailed(f"{out}: some runs failed; its table says why")
 
 
 @cli.command()

@@ -74,6 +74,10 @@ class MethodFailed(Ending):
     exit_code = 3
 
 
+class RunsFailed(MethodFailed):
+    """Command of several runs, some of which failed."""
+
+
 class ProcessLost(MethodFailed):
     """Process of a run that ended unexpectedly."""
 

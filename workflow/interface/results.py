@@ -128,7 +128,7 @@ class Results(Group):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the run."""
+        """Warnings of the run, each with its code at the end."""
         return list(self.summary["warnings"])
 
     @cached_property

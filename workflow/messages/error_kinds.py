@@ -75,7 +75,7 @@ class ErrorKind(MessageKind):
         "FS-E009",
         "A stored run cannot be used",
         "Files of the run or of its input are missing, damaged, changed since, or of another "
-        "version of fretscale.",
+        "version of fretscale, or there is no finished run.",
         "Put the files back, or run the case again.",
     )
     EXPECTATION_MISSED = (
@@ -124,6 +124,14 @@ class ErrorKind(MessageKind):
         "A fit is not possible",
         "The data are too few, or do not contain what the law needs.",
         "Add measurements, or hold parameters at known values.",
+    )
+
+    RUNS_FAILED = (
+        "FS-E107",
+        "Some of several runs failed",
+        "A sweep or a chart lacks runs that failed. The table gives the error of each with its own "
+        "code; the other runs are complete.",
+        "Look up the codes of the failed runs. The same command tries them again.",
     )
 
     # --- machine --------------------------------------------------------------------------------
@@ -190,6 +198,7 @@ KINDS = {
     "ContactProblemError": ErrorKind.NO_SOLUTION,
     "SolverError": ErrorKind.NOT_SOLVABLE,
     "PardisoError": ErrorKind.NOT_SOLVABLE,
+    "RunsFailed": ErrorKind.RUNS_FAILED,
     "TooCoarse": ErrorKind.TOO_COARSE,
     "FitError": ErrorKind.FIT_REFUSED,
     "FactorMemoryError": ErrorKind.OUT_OF_MEMORY,

@@ -202,7 +202,7 @@ class WarningKind(MessageKind):
         "FS-W105",
         "The coupling of dissimilar materials is neglected",
         "Shear moves the surfaces of dissimilar bodies normally, which contact.method: normal does "
-        "not resolve. Pressure and slip change by a share of about Dundurs' beta times friction.",
+        "not resolve. The error of pressure and slip grows with Dundurs' beta and with friction.",
         "Use contact.method: full.",
     )
     LONG_INCREMENTS = (
@@ -371,7 +371,7 @@ class WarningKind(MessageKind):
         "Too few increments for bodies that move over each other",
         "Between two increments the surfaces jump, and wear false edges into each other. The worn "
         "peak pressure is too large; no estimate includes this error.",
-        "Take at least 32 increments per cycle.",
+        "Take as many increments per cycle as the warning names.",
     )
     MOTION_NEGLECTED = (
         "FS-W307",
@@ -418,7 +418,7 @@ class WarningKind(MessageKind):
     UNKNOWN_STABILITY = (
         "FS-W404",
         "The stability of motions is unknown",
-        "The test of stability did not succeed for some points. They may be motions that never "
+        "The test of stability succeeded at no point of the curve. Some of its motions may never "
         "occur.",
         "Give more harmonics and samples.",
     )
@@ -472,15 +472,15 @@ class WarningKind(MessageKind):
     NO_RING_DOWN = (
         "FS-W412",
         "There is no ring-down to evaluate",
-        "The free vibration is too short or too small. Frequency and damping over the amplitude "
-        "are missing for this state.",
-        "Lengthen the record, or look at a place that moves more.",
+        "The free vibration fades before the filter around its mode settles. Frequency and damping "
+        "over the amplitude are missing for this state.",
+        "Use the frequency response of this state instead.",
     )
     INACCURATE_AGEING = (
         "FS-W413",
         "The ageing is interpolated too coarsely",
         "The steady states between which wear is interpolated are too few for the tolerance.",
-        "Raise ageing.tolerance, or shorten the test.",
+        "Allow a larger ageing.tolerance, or shorten the ageing.",
     )
     ENERGY_NOT_REACHED = (
         "FS-W414",
