@@ -49,6 +49,8 @@ class OneLineGroup(click.Group):
             # click and rich end this way when a pipe was closed.
             message, kind, code = _ending(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
         except click.Abort as abort:
+            if isinstance(abort.__cause__, EOFError):
+                raise abort.__cause__ from None  # no command asks for input: a file is damaged
             left = f": {stop}" if (stop := abort.__cause__) and stop.args else ""
             message, kind, code = f"interrupted{left}", ErrorKind.INTERRUPTED, errors.INTERRUPTED
         except click.ClickException as error:

@@ -13,6 +13,7 @@ from fe_models.solvers.linear_solver import FactorMemoryError
 from sa_solver.errors import ConvergenceError, InputError
 from workflow import errors
 from workflow.cli import cli
+from workflow.commands.group import OneLineGroup
 from workflow.kinds import kinds
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -30,6 +31,7 @@ def test_help_imports_nothing_heavy(arguments):
 import sys
 before = set(sys.modules)
 from workflow.cli import cli
+from workflow.commands.group import OneLineGroup
 try:
     cli({arguments})
 except SystemExit as end:
@@ -182,3 +184,15 @@ def test_verify_reports_by_exit_code(monkeypatch, dovetail_path, tmp_path):
         monkeypatch.setitem(sys.modules, "workflow.runs.verify", stand_in)
         done = invoke("verify", dovetail_path, "--out", tmp_path)
         assert done.exit_code == (0 if passed else 1)
+
+
+def test_a_file_that_ends_early_is_no_interruption():
+    """click takes the end of any file for that of the input, and would end the command quietly."""
+    group = OneLineGroup("fretscale")
+
+    @group.command()
+    def read():
+        raise EOFError("marshal data too short")
+
+    with pytest.raises(EOFError, match="marshal"):
+        group.main(["read"])
