@@ -187,7 +187,7 @@ def test_verify_reports_by_exit_code(monkeypatch, dovetail_path, tmp_path):
 
 
 def test_a_file_that_ends_early_is_no_interruption():
-    """click takes the end of any file for that of the input, and would end the command quietly."""
+    """Click takes the end of any file for that of the input, and would end the command quietly."""
     group = OneLineGroup("fretscale")
 
     @group.command()
