@@ -127,6 +127,7 @@ def test_motions_less_accurate_than_asked_for_give_a_warning(model):
         replace(few, sweep=within(0.5 * error)).run()
 
 
+@pytest.mark.slow
 def test_a_model_vibrates_as_its_case(tmp_path):
     case = fretscale.load_case(
         CASES / "rig_two_dof.yaml",

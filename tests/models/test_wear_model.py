@@ -101,6 +101,7 @@ def same_stress(results, written):
             assert found["notch_error"].values[state] == notch["error"]
 
 
+@pytest.mark.slow
 def test_a_plane_joint_has_the_stress_of_its_case(tmp_path, monkeypatch):
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
     case = fretscale.load_case(
@@ -247,6 +248,7 @@ def test_a_contact_at_the_border_is_warned_of(model):
         small.run()
 
 
+@pytest.mark.slow
 def test_errors_of_the_steps_are_near_the_true_ones():
     """Automatic steps at 1 % report the change that steps of a tenth of the tolerance make."""
     own = script("own_loads")

@@ -200,6 +200,7 @@ def sections(node, path=(), place=()):
             yield from sections(item, (*path, str(index)), place)
 
 
+@pytest.mark.slow
 def test_unknown_key_is_refused_in_every_section(folders):
     tried = set()
     for leaf in VARIANTS.values():

@@ -160,6 +160,7 @@ def ways(text, tried, overrides=(), within=""):
         yield from ways(opened, tried, [*overrides, *needed], f"{key}.")
 
 
+@pytest.mark.slow
 def test_every_comment_of_a_template_may_be_opened(folders):
     """Kinds of load, law and shape, and entries, are tested once over all templates."""
     tried, wrong = set(), []

@@ -43,6 +43,7 @@ def run(tmp_path: Any, text: str) -> dict[str, Any]:
     return summary
 
 
+@pytest.mark.slow
 def test_a_further_branch_is_found_with_its_fold_and_drawn_dashed(tmp_path: Any) -> None:
     """Descending from 300 Hz finds small motions; large and unstable ones are connected."""
     summary = run(tmp_path, CASE)

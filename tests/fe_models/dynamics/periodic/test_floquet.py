@@ -134,6 +134,7 @@ def test_duffing_in_one_harmonic_against_mathieu(value, share):
     assert (traces[0] - 2.0) * (traces[2] - 2.0) < 0.0
 
 
+@pytest.mark.slow
 def test_folds_of_duffing_are_where_the_curve_turns_and_a_multiplier_is_1(folded):
     branch, known = folded
     found = find_bifurcations(curve_by_frequency(branch.problem, 0.3), branch.solutions, known)

@@ -421,6 +421,7 @@ def test_grids_are_compared_by_their_order() -> None:
 # --- models in Python ---------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_budget_of_a_model_is_that_of_the_run_of_its_case(tmp_path) -> None:
     """A run stores its states, and solves contacts and probe runs in processes of their own."""
     short = "wear.cycles=2e4", "wear.step={kind: implicit, cycles: 1e4}"
