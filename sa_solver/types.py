@@ -181,26 +181,29 @@ class ElasticPair:
         return cls(body, body)
 
     @property
+    def bodies(self) -> tuple[Material, Material]:
+        """Both bodies, body 1 first."""
+        return self.body_1, self.body_2
+
+    @property
     def normal(self) -> float:
         """Compliance Σ (1-ν)/G [1/MPa] of the normal displacement under pressure."""
-        return sum((1.0 - m.poisson) / m.shear_modulus for m in (self.body_1, self.body_2))
+        return sum((1.0 - m.poisson) / m.shear_modulus for m in self.bodies)
 
     @property
     def shear(self) -> float:
         """Compliance Σ 1/G [1/MPa] of the displacement under shear, along the shear."""
-        return sum(1.0 / m.shear_modulus for m in (self.body_1, self.body_2))
+        return sum(1.0 / m.shear_modulus for m in self.bodies)
 
     @property
     def poisson(self) -> float:
         """Compliance Σ ν/G [1/MPa]: the effect of Poisson's ratio on the response to shear."""
-        return sum(m.poisson / m.shear_modulus for m in (self.body_1, self.body_2))
+        return sum(m.poisson / m.shear_modulus for m in self.bodies)
 
     @property
     def coupling(self) -> float:
         """Compliance ½ [(1-2ν2)/G2 - (1-2ν1)/G1] [1/MPa] that couples pressure and shear."""
-        first, second = (
-            (1.0 - 2.0 * m.poisson) / m.shear_modulus for m in (self.body_1, self.body_2)
-        )
+        first, second = ((1.0 - 2.0 * m.poisson) / m.shear_modulus for m in self.bodies)
         return 0.5 * (second - first)
 
     @property

@@ -7,10 +7,12 @@ user of the command: one line that says what is wrong and what to do about it.
 from __future__ import annotations
 
 import errno
+import warnings
+from collections.abc import Iterable
 
 from sa_solver.errors import FretscaleError, InputError
 from workflow.messages.error_kinds import error_kind
-from workflow.messages.warning_kinds import WarningKind
+from workflow.messages.warning_kinds import Notice, WarningKind
 
 DONE = 0
 INTERRUPTED = 130
@@ -136,3 +138,9 @@ class ModelWarning(UserWarning):
     def code(self) -> str:
         """Code of the warning."""
         return self.kind.code
+
+
+def warn_each(notices: Iterable[Notice]) -> None:
+    """Give a :class:`ModelWarning` for each of ``notices``, at the place that runs the model."""
+    for notice in notices:
+        warnings.warn(ModelWarning(*notice), stacklevel=3)

@@ -132,3 +132,8 @@ def test_shares_of_missions_add_up():
     for wrong in ((0.9, 0.9), (-0.5, 1.5), (1.0,), (np.nan, 1.0)):
         with pytest.raises(InputError, match="shares"):
             LoadHistory.mix([cycle, cycle], wrong)
+
+
+def test_a_face_has_one_history_of_loads():
+    with pytest.raises(InputError, match="a ContactFace with its CycleLoads"):
+        fretscale.GivenLoads([(pad(), history(50.0, 20.0), history(50.0, 20.0))])

@@ -94,11 +94,8 @@ def _ending(error: Exception) -> tuple[str, ErrorKind, int]:
     if isinstance(error, FretscaleError):
         return str(error), error_kind(error), errors.exit_code(error)
     if isinstance(error, BrokenPipeError) and error.filename is None:
-        return (
-            "",
-            ErrorKind.OUTPUT_FAILED,
-            errors.NotWritten.exit_code,
-        )  # as for `head`: the reader needs no more
+        # As for `head`: the reader needs no more.
+        return "", ErrorKind.OUTPUT_FAILED, errors.NotWritten.exit_code
     if isinstance(error, OSError) and error.errno in errors.UNWRITTEN:
         written = f"output: {error.strerror}"
         if error.filename is not None:

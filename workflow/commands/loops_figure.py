@@ -38,9 +38,8 @@ def figure(loops: MeasuredLoops, name: str) -> Figure:
     panels = right.subplots(3, 1, sharex=True)
     _draw_values(panels[0], PER_MICRON * loops.stick_stiffness, "stiffness kt [N/µm]", BLUE)
     friction, symbol = _friction(loops)
-    _draw_values(
-        panels[1], friction, f"friction {symbol}".replace("friction force", "force"), ORANGE
-    )
+    label = f"friction {symbol}" if symbol.startswith("µ") else symbol
+    _draw_values(panels[1], friction, label, ORANGE)
     _draw_values(panels[2], loops.energy, "energy per cycle [mJ]", GREEN)
     panels[2].set_xlabel("cycle of the record")
     panels[2].set_xlim(0.5, len(loops.energy) + 0.5)

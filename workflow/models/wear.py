@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
@@ -18,9 +17,9 @@ from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState, Observer, check_observers, observed
 from wear.schedule import CoupledSettings
 from wear.steps.steppers import ROUNDING
-from workflow.errors import ModelWarning
+from workflow.errors import warn_each
 from workflow.messages.warning_kinds import Notice
-from workflow.models.checks.limits import check_explicit_steps, check_jumps, unstable_fraction
+from workflow.models.checks.limits import check_steps, unstable_fraction
 from workflow.models.checks.loads import check_loads
 from workflow.models.checks.start import check_origin, origin_of
 from workflow.models.checks.warnings import (
@@ -30,7 +29,7 @@ from workflow.models.checks.warnings import (
     growth_warnings,
     instability_warnings,
     link_warnings,
-    open_warnings,
+    unpressed_warnings,
     yield_warnings,
 )
 from workflow.models.contact import (
@@ -233,20 +232,15 @@ class WearModel:
                 watching.append(StabilityWatch(contacts))
             loop = self.loop(loads, contacts, watching)
             state, first = self.begin(loop, unworn, start)
-            check_jumps(self.settings(loads), state)
-            stable = [found.stable_cycles for found in first]
-            check_explicit_steps(self.wear.cycles, self.wear.fraction, stable)
-            begun = _warnings(loads, contacts, first)
-            for notice in (*unstable_fraction(self.wear.fraction), *begun):
-                warnings.warn(ModelWarning(*notice), stacklevel=2)
+            check_steps(self.settings(loads), self.wear.fraction, state, first)
+            warn_each(unstable_fraction(self.wear.fraction))
+            warn_each(_warnings(loads, contacts, first))
             end, found = loop.run(state), None
-            for notice in _end_warnings(contacts, first, end, recorder):
-                warnings.warn(ModelWarning(*notice), stacklevel=2)
+            warn_each(_end_warnings(contacts, first, end, recorder))
             if self.stress is not None:
                 with observed(observers, "stress"):
                     found = self._stress(self.stress, loads, contacts.faces(end), unworn, first)
-                for notice in found.faults(loads.peak):
-                    warnings.warn(ModelWarning(*notice), stacklevel=2)
+                warn_each(found.faults(loads.peak))
             return WearResults(recorder, end, unworn, loads.line, found).tree()
 
     def begin(
@@ -315,15 +309,15 @@ def _warnings(
     if isinstance(loads, StructureLoads):
         yield from (Notice(kind, text) for text, kind in loads.remarks() if kind is not None)
     yield from friction_warnings(stages)
-    for stage, contact in zip(stages, first, strict=True):
-        yield from open_warnings(stage.name, contact.pressure.sum(axis=(1, 2)), loads.peak)
+    yield from unpressed_warnings(stages, first, loads.peak)
     yield from border_warnings(stages, first)
     if _half_spaces(contacts):
         yield from few_cells_warnings(stages, [contact.pressure[loads.peak] for contact in first])
     yield from dissimilar_warnings(stages, first)
     for stage, contact in zip(stages, first, strict=True):
         yield from link_warnings(stage.name, contact.link)
-        yield from yield_warnings(stage, contact)
+        highest = float(contact.pressure.max())
+        yield from yield_warnings(highest, stage.pair.bodies, f"{stage.name}: ")
 
 
 def _end_warnings(
@@ -356,15 +350,15 @@ class StabilityWatch(Observer):
     def jump_started(self, state: CoupledState[Any], cycles: float) -> None:
         if self.warned or not _half_spaces(self.contacts):
             return
-        for notice in instability_warnings(self.contacts.faces(state), cycles):
-            self.warned = True
-            warnings.warn(ModelWarning(*notice), stacklevel=2)
+        found = list(instability_warnings(self.contacts.faces(state), cycles))
+        self.warned = bool(found)
+        warn_each(found)
 
 
 def _check_surfaces(start: CoupledState[Any], unworn: CoupledState[Any]) -> None:
-    """Raise InputError unless a state has the gaps of ``unworn`` faces: functions have no digest.
+    """Raise InputError unless a state has the gaps of ``unworn`` faces.
 
-    Functions count by their names in the digests of a model.
+    Digests of a model have only the names of functions, which do not tell two gaps apart.
     """
     pairs = zip(start.interfaces, unworn.interfaces, strict=False)
     if len(start.interfaces) != len(unworn.interfaces) or not all(

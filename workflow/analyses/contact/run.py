@@ -18,6 +18,7 @@ from workflow.analyses.contact.output.results import (
 from workflow.case.text.readable import percent
 from workflow.errors import MethodFailed, UserError
 from workflow.messages.warning_kinds import WarningKind
+from workflow.models.checks.warnings import yield_warnings
 from workflow.shell.few_cells import check_cells
 from workflow.shell.folders.folder import OutputFolder
 from workflow.shell.terminal.reporter import Reporter
@@ -48,8 +49,7 @@ def _march(
 ) -> tuple[ContactOutcome, str]:
     """Return the outcome of the path, and a message on why it ended early; empty if it did not."""
     grid, table = case.contact.centred(), case.load_path.table()
-    for warning in surface_warnings(case.structure, grid):
-        reporter.warn(*warning)
+    reporter.warn_each(surface_warnings(case.structure, grid))
     height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
     strain = table.bulk_strain(bodies_of(case))
     passed: dict[int, ContactState] = {}
@@ -109,13 +109,7 @@ def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
             "the contact touches the border of its grid and is cut off there: raise contact.size",
         )
     highest = max(float(state.traction[2].max()) for state in states)
-    yield_stress = min(body.yield_stress for body in bodies_of(outcome.case))
-    if highest > yield_stress:
-        reporter.warn(
-            WarningKind.PRESSURE_ABOVE_YIELD,
-            f"the pressure reaches {highest:.0f} MPa, above the yield stress of "
-            f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there",
-        )
+    reporter.warn_each(yield_warnings(highest, bodies_of(outcome.case)))
 
 
 def _warn_of_increments(outcome: ContactOutcome, reporter: Reporter) -> None:

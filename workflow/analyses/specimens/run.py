@@ -86,8 +86,7 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
 
 
 def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> SpecimensOutcome:
-    for warning in case.surface_warnings():
-        reporter.warn(*warning)
+    reporter.warn_each(case.surface_warnings())
     model = reduced_pair(case)
     with reporter.stage("mesh"):
         nodes = model.node_count()

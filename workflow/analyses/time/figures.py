@@ -260,8 +260,8 @@ def _ring_down_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
     lowest = min(change for change, _ in found)
     damping = max(100.0 * np.abs(envelope["damping_ratio"][()]).max() for _, envelope in found)
     return (
-        f"The first mode is up to {abs(lowest):.2g}% below the stuck joint's, "
-        f"its damping ratio up to {damping:.2g}%"
+        f"The first mode is up to {abs(lowest):.2g} % below the stuck joint's, "
+        f"its damping ratio up to {damping:.2g} %"
     )
 
 

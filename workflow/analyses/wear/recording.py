@@ -14,15 +14,12 @@ from sa_solver.types import Array
 from wear.coupled_state import CoupledState, Observer
 from wear.schedule import CoupledSettings
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.checks.warnings import (
-    warn_of_growth,
-    warn_of_instability,
-    warn_of_many_jumps,
-)
+from workflow.analyses.wear.checks.warnings import warn_of_many_jumps
 from workflow.analyses.wear.worn.bolts import stored_tensions
 from workflow.analyses.wear.worn.contact_loops import stored_loops
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import percent
+from workflow.models.checks.warnings import growth_warnings, instability_warnings
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 from workflow.models.progress import ReportsProgress
@@ -62,11 +59,12 @@ class RunLog(Observer):
     def jump_started(self, state: CoupledState[Any], cycles: float) -> None:
         step = self.run.case.wear.step
         if step.kind == "explicit" and step.fraction is None:
-            warn_of_instability(self.contacts.faces(state), cycles, self.run.reporter)
+            faces = self.contacts.faces(state)
+            self.run.reporter.warn_each(instability_warnings(faces, cycles))
 
     def jump_finished(self, before: CoupledState[Any], after: CoupledState[Any]) -> None:
         if self.run.case.contact.method != "nodes":
-            warn_of_growth(self.contacts.faces(after), self.run.reporter)
+            self.run.reporter.warn_each(growth_warnings(self.contacts.faces(after)))
         drift, cost = after.drift[-1], after.cost - before.cost
         if after.solutions > before.solutions:
             self.run.reporter.log(f"drift {percent(drift)}: loads computed again")

@@ -37,7 +37,7 @@ from workflow.analyses.wear.worn.worn_structure import nonlinearity_sentence
 from workflow.errors import MethodFailed, UserError
 from workflow.messages.warning_kinds import WarningKind
 from workflow.models.budget.budget import interface_outcomes
-from workflow.models.checks.limits import check_explicit_steps, check_jumps
+from workflow.models.checks.limits import check_steps
 from workflow.models.checks.warnings import friction_step_warnings
 from workflow.models.contact import ContactEnd, last_cycle
 from workflow.models.contacts import FaceContacts
@@ -82,8 +82,7 @@ def _compute(
     ``working`` keeps the workers until these results are in.
     """
     case, reporter = run.case, run.reporter
-    for warning in case.surface_warnings():
-        reporter.warn(*warning)
+    reporter.warn_each(case.surface_warnings())
     model = wear_model(case)
     source = model.loads(DiskStore())
     faces = meshed_faces(case, source, reporter)
@@ -157,15 +156,12 @@ def _march(
     recorder = FileRecorder(run, settings, source.peak, contacts, source, steps)
     loop = model.loop(source, contacts, (RunLog(run, contacts, source), recorder))
     state, first = loop.begin(unworn)
-    check_jumps(settings, state)
-    stable = [found.stable_cycles for found in first]
-    check_explicit_steps(model.wear.cycles, model.wear.fraction, stable)
+    check_steps(settings, model.wear.fraction, state, first)
     warn_of_contact(case, source, contacts.faces(state), first, reporter)
     with reporter.course("wear"):
         end = loop.run(state, steps)
     steps.save()
-    for notice in friction_step_warnings(contacts.stages, first, end):
-        reporter.warn(*notice)
+    reporter.warn_each(friction_step_warnings(contacts.stages, first, end))
     warn_of_worn_cells(case, source.peak, contacts.faces(end), reporter)
     return end, first
 

@@ -6,13 +6,14 @@ cases refuse it before anything is computed, with the number that it would take.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from sa_solver.errors import InputError
 from workflow.messages.warning_kinds import Notice, WarningKind
 
 if TYPE_CHECKING:
+    from wear.contact.interface import FirstContact
     from wear.coupled_state import CoupledState
     from wear.schedule import CoupledSettings
 
@@ -46,8 +47,20 @@ def check_count(what: str, count: float, most: int, remedy: str) -> None:
         raise InputError(f"{count:.3g} {what}, and at most {most} are possible: {remedy}")
 
 
-def check_jumps(settings: CoupledSettings, state: CoupledState[Any]) -> None:
-    """Raise InputError if jumps of a given size would be too many at the present wear rates."""
+def check_steps(
+    settings: CoupledSettings,
+    fraction: float | None,
+    state: CoupledState[Any],
+    first: Sequence[FirstContact],
+) -> None:
+    """Raise InputError if a run would take too many jumps, or too many explicit steps.
+
+    Jumps of a given size are counted at the wear rates of the ``state``, explicit steps of a
+    ``fraction`` of their stability limit at that of the ``first`` contacts.
+    """
+    if fraction is not None:
+        count = settings.cycles / (fraction * min(found.stable_cycles for found in first))
+        check_count("explicit wear steps", count, MOST_JUMPS, "give a larger fraction, or no steps")
     if settings.automatic or settings.ended(state):
         return
     count = settings.left(state) / settings.next_jump(state)
@@ -62,10 +75,3 @@ def unstable_fraction(fraction: float | None) -> Iterator[Notice]:
             f"explicit steps of {fraction:g} times their stability limit amplify the roughness of "
             "the grid; usual: 0.9 or less",
         )
-
-
-def check_explicit_steps(cycles: float, fraction: float | None, stable: Iterable[float]) -> None:
-    """Raise InputError if steps of a ``fraction`` of the ``stable`` cycles would be too many."""
-    if fraction is not None:
-        count = cycles / (fraction * min(stable))
-        check_count("explicit wear steps", count, MOST_JUMPS, "give a larger fraction, or no steps")

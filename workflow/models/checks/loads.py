@@ -9,6 +9,7 @@ import numpy as np
 
 from sa_solver import checks
 from sa_solver.errors import InputError
+from sa_solver.types import Array, LoadHistory
 from wear.contact.face_loads import FaceLoads
 
 if TYPE_CHECKING:
@@ -35,15 +36,22 @@ def check_loads(loads: LoadSource, unworn: Sequence[FaceLoads]) -> None:
                 f"{name} is {kinds[face.face.line]}, but its source of loads is "
                 f"{kinds[bool(loads.line)]}: give both the same `line`"
             )
-        _check_cycle(name, cycle, len(face.face))
+        check_history(name, cycle.loads, ROUNDING)
+        check_slip(name, cycle.slip, cycle.loads, len(face.face))
         checks.whole("the increment of peak load", loads.peak, least=0, most=len(cycle.loads.P) - 1)
 
 
-def _check_cycle(name: str, cycle: FaceLoads, nodes: int) -> None:
-    """Raise InputError for a cycle of loads without a meaning."""
-    history = cycle.loads
+def check_history(name: str, history: LoadHistory, rounding: float = 0.0) -> None:
+    """Raise InputError unless the loads of a face are finite numbers that press its bodies.
+
+    Negative forces up to a ``rounding`` share of the largest one are accepted.
+    """
     forces = checks.array(f"resultants of {name}", history.resultants, (None, 6))
     checks.array(f"energies of {name}", [history.Edx, history.Edy], (2, None))
-    checks.array(f"slips of {name}", cycle.slip, (len(forces), 2, nodes))
-    if (least := forces[:, 0].min()) < -ROUNDING * np.abs(forces[:, 0]).max():
+    if (least := forces[:, 0].min()) < -rounding * np.abs(forces[:, 0]).max():
         raise InputError(f"{name}: P = {least:g} N pulls the bodies apart: give 0 or more")
+
+
+def check_slip(name: str, slip: Array, history: LoadHistory, nodes: int) -> None:
+    """Raise InputError unless the slips of a face are those of all increments and nodes."""
+    checks.array(f"slips of {name}", slip, (len(history), 2, nodes))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sa_solver import checks
 from sa_solver.errors import InputError
 
-# Names in the results of a model beside those of its faces.
+# Names that the results of a model have in addition to those of its faces.
 TAKEN = ("bodies", "cycles", "drift", "per_length")
 
 

@@ -6,7 +6,7 @@ runs of cases in their log and report.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -83,6 +83,14 @@ def open_warnings(name: str, carried: Array, peak: int) -> Iterator[Notice]:
         )
 
 
+def unpressed_warnings(
+    stages: Sequence[FaceContact], first: Sequence[FirstContact], peak: int
+) -> Iterator[Notice]:
+    """Yield the warnings of :func:`open_warnings` for all contacts, by their pressures."""
+    for stage, found in zip(stages, first, strict=True):
+        yield from open_warnings(stage.name, found.pressure.sum(axis=(1, 2)), peak)
+
+
 def dissimilar_warnings(
     stages: Sequence[FaceContact], first: Sequence[FirstContact]
 ) -> Iterator[Notice]:
@@ -106,14 +114,16 @@ def dissimilar_warnings(
     )
 
 
-def yield_warnings(stage: FaceContact, first: FirstContact) -> Iterator[Notice]:
-    """Yield the warning for a pressure above the yield stress."""
-    highest = float(first.pressure.max())
-    limit = min(body.yield_stress for body in (stage.pair.body_1, stage.pair.body_2))
+def yield_warnings(highest: float, bodies: Iterable[Material], where: str = "") -> Iterator[Notice]:
+    """Yield the warning for a ``highest`` pressure [MPa] above the yield stress of a body.
+
+    ``where`` begins its text.
+    """
+    limit = min(body.yield_stress for body in bodies)
     if highest > limit:
         yield Notice(
             WarningKind.PRESSURE_ABOVE_YIELD,
-            f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
+            f"{where}the pressure reaches {highest:.0f} MPa, above the yield stress of "
             f"{limit:.0f} MPa: the elastic solution is no longer valid there",
         )
 

@@ -196,7 +196,7 @@ def _interface_stress(
     done: Callable[[], None],
 ) -> InterfaceStress:
     planes = Planes(settings, stage.grid)
-    materials = stage.pair.body_1, stage.pair.body_2
+    materials = stage.pair.bodies
     bodies = [StressedBody(stage, materials[n - 1], n) for n in strained(stage)]
     stressed = [[(body, cycle, body.bulk(cycle)) for body in bodies] for cycle in cycles]
     drawn = _drawn(settings, stressed, planes, peak)

@@ -13,6 +13,7 @@ from sa_solver.errors import InputError
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, LoadHistory
 from wear.contact.face_loads import CycleLoads
+from workflow.models.checks.loads import check_history, check_slip
 from workflow.models.loads import ContactFace, UncoupledSource, UserFace
 
 # Kinds of a face and of its loads.
@@ -66,7 +67,7 @@ class GivenLoads(UncoupledSource):
                 "faces: give one for each, or none"
             )
         for pair in self.pairs:
-            if [isinstance(part, of) for part, of in zip(pair, PAIR, strict=False)] != [True, True]:
+            if len(pair) != len(PAIR) or not all(map(isinstance, pair, PAIR)):
                 raise InputError(
                     f"GivenLoads.pairs has {checks.shown(pair)}: give a ContactFace with its "
                     "CycleLoads or LoadHistory"
@@ -83,13 +84,9 @@ class GivenLoads(UncoupledSource):
             raise InputError("some faces are line contacts, others are not: give one kind")
         for face, loads in self.pairs:
             history, name = _history(loads), face.face.name
-            checks.array(f"resultants of {name}", history.resultants, (None, 6))
-            checks.array(f"energies of {name}", [history.Edx, history.Edy], (2, None))
-            if (force := history.P.min()) < 0.0:
-                raise InputError(f"{name}: P = {force:g} N pulls the bodies apart: give 0 or more")
+            check_history(name, history)
             if isinstance(loads, CycleLoads):
-                shape = len(history), 2, len(face.face)
-                checks.array(f"slips of {name}", loads.slip, shape)
+                check_slip(name, loads.slip, history, len(face.face))
 
     @cached_property
     def faces(self) -> tuple[ContactFace, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,7 +12,8 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.steps import COMPUTED, Steps
 from wear.coupled_state import Observer, check_observers, observed
-from workflow.errors import ModelWarning
+from workflow.errors import warn_each
+from workflow.messages.warning_kinds import Notice
 from workflow.models.rig.laws import Laws
 from workflow.models.rig.rig_model import RigModel
 from workflow.models.vibration.excitation import Driving
@@ -167,6 +167,6 @@ class VibrationModel:
         for name, force in zip(names, self.forces, strict=True):
             with observed(observers, name):
                 responses[name] = self.response(force, steps, observers)
-            for kind, text in responses[name].faults(self.sweep.accuracy):
-                warnings.warn(ModelWarning(kind, f"{name}: {text}"), stacklevel=2)
+            faults = responses[name].faults(self.sweep.accuracy)
+            warn_each(Notice(kind, f"{name}: {text}") for kind, text in faults)
         return VibrationResults(self.structure, self.sweep.span, responses).tree()

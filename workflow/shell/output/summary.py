@@ -24,8 +24,7 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     same in short.
     """
     reporter, measured = run.reporter, run.measured()
-    for warning in comparison_warnings(measured):
-        reporter.warn(*warning)
+    reporter.warn_each(comparison_warnings(measured))
     seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
     summary = {
         "title": run.case.title,

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from sa_solver.types import Progress
-from workflow.messages.warning_kinds import WarningKind
+from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.shell.folders.isolation import Isolation
 from workflow.shell.folders.store import check_regular
 from workflow.shell.forecast import Forecast, about
@@ -141,6 +141,11 @@ class Reporter:
     def warn(self, kind: WarningKind, text: str) -> None:
         """Show a warning once with its code, and store it for the summary."""
         self.repeat(kind.marked(text))
+
+    def warn_each(self, notices: Iterable[Notice]) -> None:
+        """Show warnings as :meth:`warn` does."""
+        for notice in notices:
+            self.warn(*notice)
 
     def repeat(self, line: str) -> None:
         """Show a warning that has its code already, unless it was shown before."""

@@ -22,9 +22,8 @@ from workflow.case.text.readable import percent
 from workflow.messages.warning_kinds import WarningKind
 from workflow.models.checks.warnings import (
     dissimilar_warnings,
-    growth_warnings,
-    instability_warnings,
     open_warnings,
+    unpressed_warnings,
     yield_warnings,
 )
 from workflow.models.contact import FaceContact, WornFaces, border_warnings
@@ -77,8 +76,7 @@ def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: 
         )
     for history in unworn.histories:
         P = history.loads.P
-        for notice in open_warnings(history.interface.name, P, stage.peak):
-            reporter.warn(*notice)
+        reporter.warn_each(open_warnings(history.interface.name, P, stage.peak))
         if P[stage.peak] > 0.0:
             _warn_of_few_nodes(history, stage, reporter)
             _warn_of_form(history, stage, reporter)
@@ -160,31 +158,22 @@ def warn_of_contact(
     """
     stages = [stage for stage, _ in faces]
     if not isinstance(source, StructureLoads):
-        _warn_of_open(stages, first, source.peak, reporter)
-    for notice in (*dissimilar_warnings(stages, first), *border_warnings(stages, first)):
-        reporter.warn(*notice)
+        reporter.warn_each(unpressed_warnings(stages, first, source.peak))
+    reporter.warn_each(dissimilar_warnings(stages, first))
+    reporter.warn_each(border_warnings(stages, first))
     for (stage, state), result in zip(faces, first, strict=True):
         if case.contact.method != "nodes":
             report_link(stage.name, result.link, stage.grid.line, reporter)
-        for notice in yield_warnings(stage, result):
-            reporter.warn(*notice)
+        highest = float(result.pressure.max())
+        reporter.warn_each(yield_warnings(highest, stage.pair.bodies, f"{stage.name}: "))
         if case.contact.method == "nodes":
             continue  # the grid only shows them
         if reason := _energies_differ(source, stage, state.loads, result):
             reporter.warn(WarningKind.ENERGIES_DIFFER, f"{stage.name}: {reason}")
         settings, pressure = case.contact_of(stage.name), result.pressure[source.peak]
         check_cells(stage.name, settings, stage.grid, pressure, reporter)
-        for notice in structure_of(case).warnings(case, stage, float(state.loads.P[source.peak])):
-            reporter.warn(*notice)
-
-
-def _warn_of_open(
-    stages: Sequence[FaceContact], first: Sequence[FirstContact], peak: int, reporter: Reporter
-) -> None:
-    """Warn of half-space contacts that carry nothing, or nothing at peak load."""
-    for stage, result in zip(stages, first, strict=True):
-        for notice in open_warnings(stage.name, result.pressure.sum(axis=(1, 2)), peak):
-            reporter.warn(*notice)
+        load = float(state.loads.P[source.peak])
+        reporter.warn_each(structure_of(case).warnings(case, stage, load))
 
 
 def _energies_differ(
@@ -224,18 +213,6 @@ def _work_of_sliding(stage: FaceContact, loads: LoadHistory) -> float:
     shear, modulus = friction * float(loads.P.max()), stage.pair.contact_modulus
     width = 1.0 if stage.grid.line else np.sqrt(np.prod(stage.grid.size))
     return float(shear**2 / (modulus * width))
-
-
-def warn_of_instability(faces: WornFaces, cycles: float, reporter: Reporter) -> None:
-    """Warn of explicit steps with more cycles than is stable."""
-    for notice in instability_warnings(faces, cycles):
-        reporter.warn(*notice)
-
-
-def warn_of_growth(faces: WornFaces, reporter: Reporter) -> None:
-    """Warn of half-space contacts that have worn up to the border of their grid."""
-    for notice in growth_warnings(faces):
-        reporter.warn(*notice)
 
 
 def warn_of_many_jumps(

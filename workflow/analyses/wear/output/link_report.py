@@ -44,5 +44,4 @@ def report_link(name: str, link: StructureLink, line: bool, reporter: Reporter) 
         f"polynomials {fit}, with errors of {percent(misfit)} (smooth) and {percent(graininess)} "
         "(grainy)"
     )
-    for notice in link_warnings(name, link):
-        reporter.warn(*notice)
+    reporter.warn_each(link_warnings(name, link))
