@@ -447,7 +447,10 @@ def materials() -> None:
 @cli.command()
 @click.argument("code", required=False)
 def explain(code: str | None) -> None:
-    """Explain the CODE of a warning or an error, such as FS-W102; without CODE list all."""
+    """Explain the CODE of a warning or an error, such as FS-W102.
+
+    Without CODE, list all codes.
+    """
     from workflow.commands.explain import explained
 
     for name, text in explained(code):
