@@ -57,4 +57,4 @@ def message_page(name: str) -> str:
 def section(kind: MessageKind) -> str:
     """Return the section of one kind of message, below its anchor."""
     head = f"({kind.code.lower()})=\n## {kind.code}: {kind.title}"
-    return f"{head}\n\n{kind.meaning}\n\n**What to do:** {kind.remedy}"
+    return f"{head}\n\n{kind.meaning}\n\n**Remedy:** {kind.remedy}"

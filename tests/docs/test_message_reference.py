@@ -5,6 +5,9 @@ import re
 import sys
 from pathlib import Path
 
+import pytest
+
+from tests.docs.test_language import LONGEST_PAGE, sentences, unclear
 from workflow.messages.error_kinds import ErrorKind
 from workflow.messages.warning_kinds import WarningKind
 
@@ -31,3 +34,11 @@ def test_pages_name_codes_that_exist():
     named = {code for path in pages for code in re.findall(r"FS-[WE]\d+", path.read_text("utf-8"))}
     assert named
     assert named <= set(CODES)
+
+
+@pytest.mark.parametrize("name", message_reference.PAGES)
+def test_pages_are_short_and_plain(name, tmp_path):
+    page = tmp_path / f"{name}.md"
+    page.write_text(message_reference.message_page(name), encoding="utf-8")
+    assert unclear(page) == []
+    assert sum(len(sentence.split()) for sentence in sentences(page)) <= LONGEST_PAGE

@@ -145,13 +145,13 @@ class ErrorKind(MessageKind):
     OUTPUT_FAILED = (
         "FS-E202",
         "Output cannot be written",
-        "The disk or quota is full, or a device failed. What was written before is complete.",
+        "The disk or quota is full, or a device failed. Earlier output is complete.",
         "Free space, and continue with `fretscale resume DIR` or the same command.",
     )
     INTERRUPTED = (
         "FS-E203",
         "The command was interrupted",
-        "Ctrl-C or a batch system ended it. What was done is stored.",
+        "Ctrl-C or a batch system ended it. Results so far are stored.",
         "Continue with `fretscale resume DIR`, or with the same command for several runs.",
     )
     PROCESS_LOST = (

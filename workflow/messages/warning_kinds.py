@@ -620,7 +620,7 @@ class WarningKind(MessageKind):
     FOREIGN_FILES = (
         "FS-W902",
         "The folder has files that are not part of the run",
-        "Files were in the folder before. Those whose names the run needs are renamed.",
+        "Files were in the folder before. Files whose names the run needs are renamed.",
         "Move or delete them if they are not needed.",
     )
     DAMAGED_CACHE = (
