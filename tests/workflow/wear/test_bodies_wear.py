@@ -335,6 +335,6 @@ def test_a_run_estimates_the_pressure_error_of_its_steps(tmp_path) -> None:
         warned = [line for line in warnings if "of the worn peak pressure" in line]
         assert bool(warned) == (left > 0.1)
         if warned:
-            step = re.search(r"wear\.step: (\{.*\})\)$", warned[0])[1]
+            step = re.search(r"wear\.step: (\{.*\})\) \[FS-W303\]$", warned[0])[1]
             assert "second_order" in step
     assert errors[1] < 0.6 * errors[0]
