@@ -50,11 +50,11 @@ LEGS = {"legs": [{"P": "50 N", "Qx": "10 N"}, {"Qx": "-10 N", "increments": 2}]}
     ("name", "changed"),
     [
         ("cylinder_wear", {"contact__grid": 64}),
-        ("sphere_wear", {"contact__grid": [32, 32]}),
+        ("sphere_wear", {"contact__grid": [16, 16]}),
         (
             "sphere_wear",
             {
-                "contact__grid": [24, 24],
+                "contact__grid": [12, 12],
                 "contact__method": "full",
                 "contact__accuracy": 1,
                 "load_path": LEGS,

@@ -103,7 +103,7 @@ def test_an_interrupted_motion_goes_on_from_its_checkpoint(model, tmp_path, monk
     monkeypatch.setattr(steps, "SHARE", np.inf)  # every step is saved
     checkpoint = fretscale.Checkpoint(tmp_path / "motion.h5")
     force = Counted(model.rig.driven, FORCE, FREQUENCY)
-    counted = replace(model, force=force, control=TimeStepControl(5e-6))
+    counted = replace(model, force=force)
     whole, work = counted.run(), Counted.count
     monkeypatch.setattr(Counted, "count", 0)
     monkeypatch.setattr(Counted, "most", int(0.75 * work))

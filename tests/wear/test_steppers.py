@@ -131,8 +131,8 @@ def automatic(stepper, cycles: float) -> WearStep:
 
 
 @cache
-def exact_depth(cycles: float, steps: int = 100) -> Array:
-    """Return the depth at the end of a run by short steps of second order, accurate to 2e-5."""
+def exact_depth(cycles: float, steps: int = 30) -> Array:
+    """Return the depth at the end of a run by steps of second order, accurate to 1e-3."""
     state = rounded()
     for _ in range(steps):
         state = CONSTANT.second_order_step(state, cycles / steps).state
@@ -146,11 +146,12 @@ def errors(state: WearState, exact: Array) -> tuple[float, float]:
     return estimate / size, root_mean_square(state.surfaces.depth - exact, exact) / size
 
 
-@pytest.mark.parametrize("kind", [slow(ImplicitStepper), SecondOrderStepper])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [ImplicitStepper, SecondOrderStepper])
 def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> None:
     """The estimated error is within a factor of three of the true one."""
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())
-    exact = exact_depth(cycles)
+    exact = exact_depth(cycles, 100)  # accurate to 2e-5
     steps = []
     for tolerance in (0.02, 1e-3, 2e-4):
         end = automatic(kind(ErrorControl(tolerance)), cycles)
@@ -364,7 +365,7 @@ def test_steps_grow_where_wear_slows_down() -> None:
     rate = first.per_cycle(GRID.cell_area)[1]
     begun = replace(unworn, starts=starts, volume_rate=rate, next_cycles=4.0 * limit)
     taken = []
-    for times in (1e2, 1e4, 1e6, 1e8):
+    for times in (1e2, 1e5, 1e8):
         cycles = times * limit
         stepper = ImplicitStepper(ErrorControl(0.01))
         end = advance_cycles(stepper, begun, cycles, cycles, lambda _: contact)
@@ -377,8 +378,7 @@ def test_steps_grow_where_wear_slows_down() -> None:
     np.testing.assert_allclose(
         fixed.surfaces.depth, np.maximum(1e-3 - unworn.surfaces.gap, 0.0), atol=1e-6
     )
-    # Over the factors of a hundred the numbers of steps are 74, 88, 90 and 96.
-    assert np.diff(taken).max() < 20
+    assert np.diff(taken).max() < 30
     assert taken[0] < 100
 
 

@@ -6,28 +6,15 @@ imports inside functions and for types count like all others.
 
 import ast
 from collections.abc import Iterator
-from functools import cache
 from graphlib import TopologicalSorter
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.source_trees import PACKAGES, ROOT, modules
+
 WORKFLOW = ROOT / "workflow"
-PACKAGES = "workflow", "fe_models", "wear", "sa_solver"
 # What lies flat in workflow/: the door, the kinds there are, and what they fail with.
 MOST_FLAT_FILES = 6
-
-
-@cache
-def modules(package: str) -> dict[str, ast.Module]:
-    """Return the modules of a package by their dotted names."""
-    parsed = {}
-    for path in sorted((ROOT / package).rglob("*.py")):
-        parts = path.relative_to(ROOT).with_suffix("").parts
-        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-        parsed[name] = ast.parse(path.read_text(encoding="utf-8"))
-    return parsed
 
 
 def imported(module: ast.Module, known: dict[str, ast.Module]) -> Iterator[str]:

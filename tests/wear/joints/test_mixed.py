@@ -194,7 +194,7 @@ def test_balance_of_harmonics_is_the_motion_in_time():
     assert motion.converged
     assert motion.cycle.dissipated.min() > 0.0
     shaken = CombinedForces((HarmonicForce(push, force, frequency), ConstantForce(static)))
-    steps, periods = 400, 25
+    steps, periods = 400, 10
     control = TimeStepControl(1.0 / (steps * frequency))
     moved = integrate(model, law, shaken, periods / frequency, control).displacement[-steps - 1 :]
     expected = motion.displacement(steps)

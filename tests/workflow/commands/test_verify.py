@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tests.marks import slow
 from tests.workflow.output.figure_checks import problems_of_run
 from workflow.cli import cli
 from workflow.kinds import load_case
@@ -28,7 +27,6 @@ def quiet(text):
     return text.replace("figures: true", "figures: false")
 
 
-# The first takes a second; others are long.
 VERIFIED = (
     *("bolted_joint_test4", "bolted_joint_test2", "rig_bouc_wen", "rig_reduced", "rig_force_75N"),
     *("rig_hammer_7N", "rig_hammer_60N", "sphere_normal", "sphere_fretting", "sphere_torsion"),
@@ -37,7 +35,8 @@ VERIFIED = (
 )
 
 
-@pytest.mark.parametrize("name", [VERIFIED[0], *map(slow, VERIFIED[1:])])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", VERIFIED)
 def test_shipped_cases_meet_their_expectations(name, tmp_path):
     """The figures of their results are complete and legible too."""
     assert verification.verify_cases((CASES / f"{name}.yaml",), tmp_path)

@@ -113,7 +113,7 @@ structure: {kind: bodies, shape: sphere, radius: 10 mm}
 materials: {body_1: rigid, body_2: {young: 115 GPa, poisson: 0}}
 friction: {coefficient: 0.5}
 load_path: {legs: [{P: 400 N}]}
-contact: {grid: [32, 32], size: [0.8 mm, 0.8 mm]}
+contact: {grid: [20, 20], size: [0.8 mm, 0.8 mm]}
 output: {paraview: false, figures: false}
 """
 

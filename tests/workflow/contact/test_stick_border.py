@@ -15,6 +15,7 @@ from scipy.integrate import quad
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import brentq
 
+from tests.marks import slow
 from tests.workflow.command_line import invoke
 from wear.steps.stick_border import EDGE
 
@@ -112,7 +113,7 @@ def test_a_punch_of_cells_is_narrower_than_these() -> None:
     assert count / 2 - half_width == pytest.approx(EDGE, abs=1e-4)
 
 
-@pytest.mark.parametrize("strips", [40, 48])
+@pytest.mark.parametrize("strips", [40, slow(48)])
 def test_the_grid_error_of_a_cylinder_in_partial_slip_is_estimated(tmp_path, strips) -> None:
     """Wear is 14 % too small on 40 cells, 17 % too large on 48, in two fixed steps."""
     found = errors(tmp_path, ("P: 700 N/mm", "Qx", "134.4 N/mm"), strips)

@@ -3,12 +3,11 @@
 import ast
 import json
 import re
-from pathlib import Path
 
 import pytest
 
-import workflow
 from tests.conftest import CASES
+from tests.source_trees import PACKAGES, modules
 from tests.workflow.command_line import command, invoke
 from workflow.errors import CaseError, UserError
 from workflow.messages import error_kinds
@@ -16,16 +15,15 @@ from workflow.messages.error_kinds import ErrorKind, error_kind
 from workflow.messages.warning_kinds import Notice, WarningKind, kinds_in
 
 KINDS = [*WarningKind, *ErrorKind]
-ROOT = Path(workflow.__file__).parent
 
 
 def used(registry: str) -> set[str]:
     """Return the names of kinds that modules other than the registries use."""
     return {
         node.attr
-        for path in ROOT.rglob("*.py")
-        if path.parent.name != "messages"
-        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        for name, module in modules("workflow").items()
+        if not name.startswith("workflow.messages")
+        for node in ast.walk(module)
         if isinstance(node, ast.Attribute)
         and isinstance(node.value, ast.Name)
         and node.value.id == registry
@@ -52,9 +50,9 @@ def test_every_class_in_the_table_of_errors_exists():
     """Names are compared, because not all modules can be imported."""
     defined = {
         node.name
-        for package in ("sa_solver", "wear", "fe_models", "workflow")
-        for path in (ROOT.parent / package).rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        for package in PACKAGES
+        for module in modules(package).values()
+        for node in ast.walk(module)
         if isinstance(node, ast.ClassDef)
     }
     assert error_kinds.KINDS.keys() <= defined

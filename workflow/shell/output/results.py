@@ -42,6 +42,7 @@ class ResultsWriter:
 
     def __init__(self, file: h5py.File, layout: Layout, line: bool = False) -> None:
         self._file, self._layout, self._line = file, layout, line
+        self._scales: dict[tuple[str, str, int], h5py.Reference] = {}
 
     def put(self, group: str, arrays: Arrays, /, **attributes: Any) -> None:
         """Write arrays to a new or existing group; attributes that are None are left out.
@@ -51,9 +52,10 @@ class ResultsWriter:
         """
         place = self._file.require_group(group)
         declared = self._layout.datasets(group) if arrays else {}
+        datasets = {}
         for name, values in arrays.items():
             packed = PACKED if np.size(values) > LARGE else {}
-            written = place.create_dataset(name, data=values, **packed)
+            written = datasets[name] = place.create_dataset(name, data=values, **packed)
             unit, description = declared[name].unit_in(self._line), declared[name].description
             # The latter two are what xarray and netCDF call them.
             written.attrs.update(
@@ -62,35 +64,39 @@ class ResultsWriter:
             if declared[name].dims == (name,):
                 written.make_scale(name)
         place.attrs.update({name: value for name, value in attributes.items() if value is not None})
-        for name in arrays:
+        for name, written in datasets.items():
             if declared[name].dims != (name,):
-                self._label(place, name, declared[name].dims)
+                self._label(place, written, declared[name].dims)
 
     def put_table(self, path: Path, group: str, arrays: Arrays, /, **attributes: Any) -> None:
         """Write curves to a group, as :meth:`put` does, and as a CSV table."""
         self.put(group, arrays, **attributes)
         write_curves(path, arrays, self._layout.datasets(group))
 
-    def _label(self, place: h5py.Group, name: str, dims: tuple[str, ...]) -> None:
+    def _label(self, place: h5py.Group, dataset: h5py.Dataset, dims: tuple[str, ...]) -> None:
         """Attach the scales of its dimensions to a dataset."""
-        dataset = place[name]
-        if len(dims) != dataset.ndim:
-            raise ValueError(f"{dataset.name}: declared over {dims}, but has {dataset.ndim} axes")
+        shape = dataset.shape
+        if len(dims) != len(shape):
+            raise ValueError(f"{dataset.name}: declared over {dims}, but has {len(shape)} axes")
         scales = np.empty(len(dims), dtype=object)
-        for axis, (dim, length) in enumerate(zip(dims, dataset.shape, strict=True)):
-            scales[axis] = np.array([self._scale(place, dim, length).ref], dtype=h5py.ref_dtype)
+        for axis, (dim, length) in enumerate(zip(dims, shape, strict=True)):
+            scales[axis] = np.array([self._scale(place, dim, length)], dtype=h5py.ref_dtype)
         # h5py's attach_scale lists all datasets in an attribute of the scale too, which is slow
         # and limited to 64 kB.
         references = h5py.vlen_dtype(h5py.ref_dtype)
         dataset.attrs.create("DIMENSION_LIST", scales, dtype=references)
 
-    def _scale(self, place: h5py.Group, dim: str, length: int) -> h5py.Dataset:
+    def _scale(self, place: h5py.Group, dim: str, length: int) -> h5py.Reference:
         """Return the scale of a dimension; a link to it is made where it is in another group."""
-        if dim not in place:
-            place[dim] = h5py.SoftLink(self._coordinate(place.name.strip("/"), dim, length))
-        if not place[dim].is_scale or len(place[dim]) != length:
-            raise ValueError(f"{place.name}: {dim} is no coordinate of {length} values")
-        return place[dim]
+        key = (place.name, dim, length)
+        if key not in self._scales:
+            if dim not in place:
+                place[dim] = h5py.SoftLink(self._coordinate(place.name.strip("/"), dim, length))
+            scale = place[dim]
+            if not scale.is_scale or len(scale) != length:
+                raise ValueError(f"{place.name}: {dim} is no coordinate of {length} values")
+            self._scales[key] = scale.ref
+        return self._scales[key]
 
     def _coordinate(self, group: str, dim: str, length: int) -> str:
         """Return the path of a coordinate, or of a dimension of this length without one."""

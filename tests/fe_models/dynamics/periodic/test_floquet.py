@@ -1,6 +1,7 @@
 """Stability of periodic motions against shooting, event-driven integration and Hill's method."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -84,7 +85,7 @@ def agree(found, wanted, tolerance):
 def folded():
     branch = along_frequency(duffing(), 0.3, (0.5 / TURN, 2.5 / TURN), control=FINE)
     of = Floquet(branch.problem).stability
-    return branch, [of(motion) for motion in branch.solutions]
+    return branch, cache(lambda place: of(branch.solutions[place]))
 
 
 def test_a_joint_that_sticks_is_a_spring_whose_slider_is_neutral():
@@ -100,9 +101,9 @@ def test_a_joint_that_sticks_is_a_spring_whose_slider_is_neutral():
 
 def test_duffing_against_shooting_and_liouville(folded):
     """Liouville's formula gives the product of all multipliers for motions of every kind."""
-    branch, known = folded
-    for place in range(10, len(known), 20):
-        motion, stability = branch.solutions[place], known[place]
+    branch, stability_at = folded
+    for place in range(10, len(branch.solutions), 20):
+        motion, stability = branch.solutions[place], stability_at(place)
         wanted = shooting_multipliers(lambda x: x + x**3, lambda x: 1.0 + 3.0 * x**2, motion, 0.3)
         agree(stability.multipliers, wanted, 3e-4)
         lost = np.exp(-DAMPING / motion.frequency)
@@ -136,7 +137,8 @@ def test_duffing_in_one_harmonic_against_mathieu(value, share):
 
 @pytest.mark.slow
 def test_folds_of_duffing_are_where_the_curve_turns_and_a_multiplier_is_1(folded):
-    branch, known = folded
+    branch, stability_at = folded
+    known = [stability_at(place) for place in range(len(branch.solutions))]
     found = find_bifurcations(curve_by_frequency(branch.problem, 0.3), branch.solutions, known)
     assert [each.kind for each in found] == ["fold", "fold"]
     assert [each.unstable for each in found] == [(0, 1), (1, 0)]
@@ -155,11 +157,9 @@ def test_folds_of_duffing_are_where_the_curve_turns_and_a_multiplier_is_1(folded
 
 def test_unknown_motions_near_a_fold_do_not_affect_it(folded):
     """Motions without a verdict neither hide a fold of the curve nor contradict it."""
-    branch, known = folded
-    unknown = [
-        replace(stability, verdict="unknown", error=np.inf, multipliers=np.empty(0))
-        for stability in known
-    ]
+    branch, stability_at = folded
+    one = replace(stability_at(10), verdict="unknown", error=np.inf, multipliers=np.empty(0))
+    unknown = [one] * len(branch.solutions)
     found = find_bifurcations(curve_by_frequency(branch.problem, 0.3), branch.solutions, unknown)
     assert [each.kind for each in found] == ["fold", "fold"]
     assert [each.unstable for each in found] == [(None, None)] * 2
@@ -167,7 +167,7 @@ def test_unknown_motions_near_a_fold_do_not_affect_it(folded):
 
 def test_time_integration_on_both_sides_of_a_fold(folded):
     """A motion that starts 1 % away stays near stable motions and leaves unstable ones."""
-    branch, known = folded
+    branch, stability_at = folded
     fold = branch.curve.folds[0]
     for place in (fold - 8, fold + 12):
         motion = branch.solutions[place]
@@ -180,15 +180,15 @@ def test_time_integration_on_both_sides_of_a_fold(folded):
             rtol=1e-9,
         ).y[:, -1]
         away = np.linalg.norm(end - begin / 1.01) / np.linalg.norm(begin)
-        assert (away < 1e-3) == (known[place].verdict == "stable")
+        assert (away < 1e-3) == (stability_at(place).verdict == "stable")
 
 
 def test_hill_agrees_for_a_smooth_spring(folded):
     """With deviations in all harmonics up to 15, the sorted exponents agree."""
-    branch, known = folded
-    for place in range(10, len(known), 20):
+    branch, stability_at = folded
+    for place in range(10, len(branch.solutions), 20):
         hill = hill_multipliers(branch.problem, branch.solutions[place], 15, 256)
-        agree(known[place].multipliers, hill, 2e-3)
+        agree(stability_at(place).multipliers, hill, 2e-3)
 
 
 def exact_period(model, joints, force, frequency, y):
