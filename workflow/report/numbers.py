@@ -22,7 +22,9 @@ Groups = dict[str, dict[str, SummaryQuantity]]
 
 
 def results(quantities: Sequence[SummaryQuantity], summary: Mapping[str, Any]) -> Html:
-    """Return tables of all quantities, and a note on their errors."""
+    """Return tables of the quantities, and a note on their errors; empty without quantities."""
+    if not quantities:
+        return Html("")
     marks = _marks(quantities)
     parts = []
     for family in _families(quantities):
