@@ -13,7 +13,7 @@ from workflow.case.sections import ASIDE, Case
 from workflow.case.text.leaves import GIVEN, Leaf, in_words, leaves_of
 from workflow.case.text.plain import counted
 from workflow.case.text.readable import ALL_DIGITS, everyday_unit, percent, pretty, readable
-from workflow.case.text.typeset import given, number, typeset
+from workflow.case.text.typeset import given, number, typeset, unparted
 from workflow.kinds import analysis_of
 from workflow.messages.warning_kinds import WarningKind, kinds_in
 from workflow.report.numbers import error_budget, results
@@ -109,7 +109,7 @@ def _header(run: ReportData) -> Html:
 
 def _top_of(run: ReportData, leading: Html, budget: Html) -> Iterator[Html]:
     """Yield what a reader without knowledge of the run needs first."""
-    yield element("p", typeset(run.case.question))
+    yield element("p", unparted(typeset(run.case.question)))
     if leading:
         yield element("h3", "Main results")
         yield leading
@@ -118,7 +118,7 @@ def _top_of(run: ReportData, leading: Html, budget: Html) -> Iterator[Html]:
     if kinds:
         yield items(_counted(kind, run.summary["warnings"]) for kind in kinds)
     else:
-        yield element("p", "No warning is about the results.")
+        yield element("p", "The run gave no warning about its results.")
     if places := list(_places(run, budget)):
         yield element("h3", "What to look at")
         yield items(places)

@@ -11,7 +11,7 @@ from workflow.shell.output.quantities import CurvesOf, NumberOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, reported
 
 FREE = "free specimens"
-UNCOUPLED = "difference to a cycle with pressure and shear coupled"
+UNCOUPLED = "the difference to a cycle with pressure and shear coupled"
 # Quantities of the pads, unworn and worn.
 STATE = {
     "stick_stiffness": NumberOf(

@@ -12,8 +12,8 @@ from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, NumberOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, reported
 
-AGEING, IN_TIME = "jumps in energy, a bound", "displacement, due to the time steps"
-STEADY = "intervals between steady states"
+AGEING, IN_TIME = "the jumps in energy, as an upper bound", "the time steps"
+STEADY = "the intervals between steady states"
 # Quantities of a state.
 NUMBERS = {
     "cycles": NumberOf("1", "cycles so far"),
@@ -87,7 +87,8 @@ def _of_ageing(summary: Summary) -> dict[str, Any]:
 def _when(number: int, summary: Summary) -> str:
     """Return text for the time of a state; "at the end" for the last one of a joint that ages."""
     ends = "cycles" in summary and number == len(summary["states"]) - 1
-    return "at the end" if ends else f"at {joules(summary['states'][number]['energy'])}"
+    energy = joules(summary["states"][number]["energy"])
+    return "at the end" if ends else f"after {energy} dissipated"
 
 
 def _of_state(number: int, when: str, summary: Summary) -> Iterator[SummaryQuantity]:

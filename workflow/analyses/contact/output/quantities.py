@@ -33,7 +33,7 @@ NUMBERS = {
 # Forces and motions below this share of the largest are rounding.
 ROUNDING = 1e-9
 FORCES = "P", "Qx", "Qy"
-BY_INCREMENTS = "of the increments of the load"
+BY_INCREMENTS = "the increments of the load"
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
     CurvesOf("pressure along x in the middle, last increment", "contact/bodies/-1/pressure"),

@@ -13,7 +13,7 @@ from workflow.shell.output.quantities import CurvesOf, NumberOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, reported
 
 LINEAR, RECORDS = "linear limits", "left_out_of_records"
-ERROR = "joints' vibration or energy lost, due to harmonics and samples"
+ERROR = "harmonics and samples, for the vibration of the joints or the energy that they lose"
 # Quantities of the motion at resonance.
 NUMBERS = {
     "resonance": NumberOf("Hz", "resonance", leading=True),

@@ -17,8 +17,8 @@ from workflow.shell.analysis import Summary
 from workflow.shell.output.quantities import CurvesOf, NumberOf, SummaryQuantity
 from workflow.shell.output.summary import number_at, reported
 
-WORN = "depth or volume, by the wear steps, and by harmonics and samples of the motion that wears"
-MOTION = "joints' vibration or energy lost, by harmonics and samples"
+WORN = "the wear steps, and harmonics and samples of the motion that wears"
+MOTION = "harmonics and samples, for the vibration of the joints or the energy that they lose"
 # Quantities of a state, whose units are those of the evolution, and whether they lead.
 NUMBERS = {
     "cycles": ("cycles under the force that wears", False),

@@ -17,7 +17,7 @@ from workflow.shell.output.summary import estimate, number_at, reported
 
 # Source of estimated errors in the report: totals of the error budget.
 BUDGET = "all parts of the error budget below"
-LOOP_ERROR = "grid and increments of the loop; errors of the worn surfaces are not included"
+LOOP_ERROR = "grid and increments of the loop, but not the errors of the worn surfaces"
 STRUCTURE = "structure"
 # Description of element quality, defined as gmsh's gamma.
 QUALITY = "inscribed over circumscribed radius, 1: regular"
@@ -194,4 +194,4 @@ def _mesh_error(summary: Summary, path: str) -> dict[str, Any]:
     error = number_at(summary, f"{path}.error")
     if error is not None and error >= 1.0:
         return {"where": "mesh-dependent"}
-    return estimate(summary, f"{path}.error", "error due to the mesh")
+    return estimate(summary, f"{path}.error", "the mesh")
