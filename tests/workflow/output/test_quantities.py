@@ -1,6 +1,7 @@
 """Main results of every analysis exist as numbers, in the units of its datasets."""
 
 import json
+import re
 from pathlib import Path
 
 import h5py
@@ -17,9 +18,10 @@ from tests.workflow.vibration.time_scenes import JOINT
 from workflow.analyses.wear.output.quantities import _load_ranges
 from workflow.analyses.wear.worn.worn_structure import load_ranges
 from workflow.case.text.readable import readable
-from workflow.case.text.typeset import number
+from workflow.case.text.typeset import number, typeset, unparted
 from workflow.case.units import to_base
 from workflow.kinds import ANALYSES, analyses, analysis_of, load_case
+from workflow.messages.warning_kinds import kinds_in
 from workflow.report.page import html, unbroken
 from workflow.report.run_page import run_page
 from workflow.report.writing import report_data_of, write_report
@@ -85,7 +87,12 @@ def test_main_results_are_numbers_in_the_units_of_the_results(tmp_path, name):
     assert len(quantities) >= 4
     leading = [quantity for quantity in quantities if quantity.leading]
     assert 0 < len({quantity.name for quantity in leading}) <= MOST_LEADING
-    top = run_page(report_data_of(out, figures=False)).partition("<nav>")[0]
+    text = run_page(report_data_of(out, figures=False))
+    top = text.partition("<nav>")[0]
+    assert html(unparted(typeset(case.question))) in top
+    links = set(re.findall(r'href="#([^"]+)"', text))
+    assert {kind.code for kind in kinds_in(summary["warnings"])} <= links
+    assert links <= set(re.findall(r' id="([^"]+)"', text))
     for quantity in leading:
         value = required_number(summary, quantity.path)
         shown = readable(value, quantity.unit, quantity.error, quantity.everyday)
