@@ -15,7 +15,7 @@ UNCOUPLED = "the difference to a cycle with pressure and shear coupled"
 # Quantities of the pads, unworn and worn.
 STATE = {
     "stick_stiffness": NumberOf(
-        "N/mm", "tangential stiffness, all that touches stuck", "N/um", leading=True
+        "N/mm", "tangential stiffness while nothing slips", "N/um", leading=True
     ),
     "secant_stiffness": NumberOf("N/mm", "slope of the loop up to half of its force", "N/um"),
     "area": NumberOf("mm^2", "contact area"),
