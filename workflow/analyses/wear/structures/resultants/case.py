@@ -241,7 +241,8 @@ class ResultantsCase(WearCase):
 
     @property
     def loads_in_words(self) -> str:
-        return f"the resultants of {Path(split_dataset(self.structure.file)[0]).name}"
+        file = Path(split_dataset(self.structure.file)[0]).name
+        return f"loads in {self.structure.dimension}-D from {file}"
 
     def loads_outline(self) -> list[tuple[str, str]]:
         loads = self.loads()
@@ -249,7 +250,7 @@ class ResultantsCase(WearCase):
         unit = "N/mm" if self.structure.line else "N"
         slip = "with" if first.slip is not None else "without"
         return [
-            ("structure", f"{self.loads_in_words}, in {self.structure.dimension}-D, {slip} slip"),
+            ("structure", f"{self.loads_in_words}, {slip} slip"),
             ("load path", f"{len(first.loads)} increments"),
             *(
                 (
