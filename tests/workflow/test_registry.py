@@ -65,6 +65,10 @@ class HertzCase(Case):
     structure: Ball = entry("what is loaded")
     force: Force = entry("that presses [N]", "100 N")
 
+    @property
+    def question(self) -> str:
+        return f"How wide is the contact? Load: {self.force:g} N."
+
     def outline(self) -> list[tuple[str, str]]:
         return [("structure", f"ball of {self.structure.radius:g} mm under {self.force:g} N")]
 
@@ -186,6 +190,10 @@ class StampCase(WearCase):
     structure: Stamp = entry("what is loaded")
     materials: TwoMaterials = entry("the two bodies in contact")
     wear: WearSection = entry("law, length of the run and step")
+
+    @property
+    def loads_in_words(self) -> str:
+        return f"{self.structure.force:g} N"
 
     def loads_outline(self) -> list[tuple[str, str]]:
         return [("structure", f"stamp under {self.structure.force:g} N")]

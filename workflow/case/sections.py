@@ -359,6 +359,11 @@ class Case(Section, ABC):
         """
         return True
 
+    @property
+    @abstractmethod
+    def question(self) -> str:
+        """Question that a run answers in one sentence, and the loads in another one."""
+
     @abstractmethod
     def outline(self) -> list[tuple[str, str]]:
         """Return what would run, in a few rows of name and text."""

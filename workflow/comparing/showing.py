@@ -38,7 +38,7 @@ MEANING = (
     "together; where an error is unknown, nothing is marked."
 )
 # Ratios beyond LARGE are shown as a factor of two digits, not in per cent.
-LARGE, FACTOR_DIGITS = 5.0, 0.05
+LARGE, FACTOR_DIGITS = 5.0, 1.0
 # Width in columns of text that goes to a file.
 FILE_WIDTH = 140
 
@@ -131,7 +131,7 @@ def columns_of(comparison: ComparedRuns) -> dict[str, list[Any]]:
 def comparison_page(comparison: ComparedRuns, figures: dict[str, str]) -> str:
     """Return the whole page; ``figures`` are SVG texts by their titles."""
     names = comparison.names
-    pictures = [picture(svg, title, captioned=False) for title, svg in figures.items()]
+    pictures = [picture(svg, title) for title, svg in figures.items()]
     parts = [
         section("The runs", _runs(comparison)),
         section("Differences of their cases", _entries(comparison)),
@@ -144,9 +144,8 @@ def comparison_page(comparison: ComparedRuns, figures: dict[str, str]) -> str:
         "header",
         element("h1", title),
         element("p", f"{lead}is {names[0]}.", cls="lead"),
-        contents_of(parts),
     )
-    return page(title, header, *parts)
+    return page(title, header, contents_of(parts), *parts)
 
 
 def _runs(comparison: ComparedRuns) -> Html:

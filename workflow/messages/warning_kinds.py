@@ -18,6 +18,11 @@ from workflow.messages.kinds import PATTERN, MessageKind
 class WarningKind(MessageKind):
     """Kind of warning. The results are computed, but some may be wrong or missing."""
 
+    @property
+    def is_on_results(self) -> bool:
+        """True unless the warning is about files and processes only."""
+        return not self.code.startswith("FS-W9")
+
     # --- input ----------------------------------------------------------------------------------
     UNUSUAL_VALUE = (
         "FS-W001",

@@ -96,7 +96,8 @@ def write_figures(
 
 def _save(figure: Figure, target: Any, kind: str) -> None:
     dots = DOTS_PER_INCH if kind == "png" else DENSE_DOTS_PER_INCH
-    figure.savefig(target, format=kind, dpi=dots, metadata=UNDATED[kind])
+    named = {"Title": figure.get_suptitle()} if kind == "svg" else {}
+    figure.savefig(target, format=kind, dpi=dots, metadata=UNDATED[kind] | named)
 
 
 def _as_svg(figure: Figure) -> str:

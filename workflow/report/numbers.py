@@ -22,7 +22,9 @@ Groups = dict[str, dict[str, SummaryQuantity]]
 
 
 def results(quantities: Sequence[SummaryQuantity], summary: Mapping[str, Any]) -> Html:
-    """Return tables of all quantities, and a note on their errors."""
+    """Return tables of the quantities, and a note on their errors; empty without quantities."""
+    if not quantities:
+        return Html("")
     marks = _marks(quantities)
     parts = []
     for family in _families(quantities):
@@ -107,10 +109,11 @@ def _note(quantities: Sequence[SummaryQuantity], marks: Mapping[str, str]) -> Ht
         if len(known) < len(quantities)
         else ""
     )
-    if not marks:
-        return note(f"± is the estimated relative error: {known[0].error_of}.{rest}")
-    sources = (element("span", element("sup", mark), f" {of}") for of, mark in marks.items())
-    return note("± is the estimated relative error: ", Html("; ".join(sources)), f".{rest}")
+    covers: object = known[0].error_of
+    if marks:
+        sources = (element("span", element("sup", mark), f" {of}") for of, mark in marks.items())
+        covers = Html("; ".join(sources))
+    return note("± is the estimated relative error. It covers ", covers, f".{rest}")
 
 
 # --- error budget -------------------------------------------------------------------------------

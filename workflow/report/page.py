@@ -9,11 +9,15 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Iterable, Sequence
-from html import escape
+from html import escape, unescape
 from pathlib import Path
 
 GENERATOR = "fretscale"
 STYLE = Path(__file__).with_name("page.css")
+
+
+# Beginning of a section or a figure: its name, and its heading or what its image shows.
+TITLED = re.compile(r'<(?:section|figure) id="([^"]+)"><(?:h2>([^<]*)|img alt="([^"]*)")')
 
 
 class Html(str):
@@ -39,22 +43,33 @@ def lines(parts: Iterable[Html]) -> Html:
     return Html("\n".join(parts))
 
 
-def section(title: str, *inside: object, key: str = "") -> Html:
+def key_of(title: str) -> str:
+    """Return the name of a section or figure, to which a link may lead."""
+    return re.sub(r"\W+", "-", title.lower()).strip("-")
+
+
+def section(title: str, *inside: object) -> Html:
     """Return a section with its heading; empty if it has no content."""
     if not any(inside):
         return Html("")
-    name = key or re.sub(r"\W+", "-", title.lower()).strip("-")
-    return element("section", element("h2", title), *inside, id=name)
+    return element("section", element("h2", title), *inside, id=key_of(title))
 
 
-def contents_of(parts: Sequence[Html]) -> Html:
-    """Return links to the sections."""
-    links = []
+def link(key: str, text: object) -> Html:
+    """Return a link to a part of the page."""
+    return element("a", text, href=f"#{key}")
+
+
+def contents_of(parts: Iterable[Html]) -> Html:
+    """Return the table of contents: links to the sections, and below each to its figures."""
+    entries = []
     for part in filter(None, parts):
-        name = part.split('id="', 1)[1].split('"', 1)[0]
-        title = part.split("<h2>", 1)[1].split("</h2>", 1)[0]
-        links.append(element("a", Html(title), href=f"#{name}"))
-    return element("nav", Html(" ".join(links)))
+        (key, title), *figures = (
+            (key, Html(text or alt)) for key, text, alt in TITLED.findall(part)
+        )
+        below = items(link(*figure) for figure in figures) if figures else ""
+        entries.append(element("span", link(key, title), below))
+    return element("nav", element("h2", "Contents"), items(entries))
 
 
 def folded(title: str, *inside: object) -> Html:
@@ -121,14 +136,26 @@ def note(*inside: object) -> Html:
     return element("p", *inside, cls="note")
 
 
-def picture(svg: str, what: str, captioned: bool = True) -> Html:
-    """Return a figure given as SVG; ``what`` is its caption unless the figure has a title itself.
+def picture(svg: str, name: str, caption: str = "") -> Html:
+    """Return a figure given as SVG, to which its ``name`` leads, with a caption if there is one.
 
     It is embedded as a separate image, because names within one SVG would conflict with others.
     """
     source = base64.b64encode(_trimmed(svg).encode("utf-8")).decode("ascii")
-    image = f'<img alt="{escape(what)}" src="data:image/svg+xml;base64,{source}">'
-    return element("figure", Html(image), element("figcaption", what) if captioned else Html(""))
+    image = f'<img alt="{escape(title_of(svg))}" src="data:image/svg+xml;base64,{source}">'
+    below = element("figcaption", caption) if caption else ""
+    return element("figure", Html(image), below, id=figure_key(name))
+
+
+def figure_key(name: str) -> str:
+    """Return the name to which a link to a figure leads."""
+    return f"figure-{key_of(name)}"
+
+
+def title_of(svg: str) -> str:
+    """Return the title of a figure given as SVG."""
+    found = re.search(r"<title>(.*?)</title>", svg, re.DOTALL)
+    return " ".join(unescape(found[1]).split()) if found else ""
 
 
 def _trimmed(svg: str) -> str:

@@ -11,25 +11,29 @@ from typing import Any
 
 from workflow.case.sections import ASIDE, Case
 from workflow.case.text.leaves import GIVEN, Leaf, in_words, leaves_of
-from workflow.case.text.readable import everyday_unit, percent, pretty, readable
-from workflow.case.text.typeset import exact_percent, given, number, typeset
+from workflow.case.text.plain import counted
+from workflow.case.text.readable import ALL_DIGITS, everyday_unit, percent, pretty, readable
+from workflow.case.text.typeset import given, number, typeset, unparted
 from workflow.kinds import analysis_of
-from workflow.messages.warning_kinds import kinds_in
+from workflow.messages.warning_kinds import WarningKind, kinds_in
 from workflow.report.numbers import error_budget, results
 from workflow.report.page import (
     Html,
     code,
     contents_of,
     element,
+    figure_key,
     folded,
     html,
     items,
     lines,
+    link,
     note,
     page,
     picture,
     section,
     table,
+    title_of,
     unbroken,
 )
 from workflow.shell.output.expectations import Verdict, verdict_of
@@ -50,6 +54,8 @@ SHORT = 20
 AT_ONCE = 0.05
 # Number of letters of a digest that are shown.
 DIGEST = 12
+# Number of figures to which the summary leads; the most important ones come first.
+FIRST_FIGURES = 3
 
 
 @dataclass(frozen=True)
@@ -72,9 +78,10 @@ def run_page(run: ReportData) -> str:
     """Return the complete report."""
     quantities = analysis_of(run.case).quantities(run.case, run.summary)
     budget = error_budget(quantities, run.summary)
+    leading = results([q for q in quantities if q.leading], run.summary)
     parts = [
         section("Analysis", _outline(run)),
-        section("Results", results(quantities, run.summary) if quantities else ""),
+        section("Results", results(quantities, run.summary)),
         section("Warnings", _warnings(run.summary["warnings"])),
         section("Expectations", _expectations(run)),
         section("Measured", _measured(run.summary)),
@@ -87,29 +94,57 @@ def run_page(run: ReportData) -> str:
         section("Time", _seconds(run.summary["seconds"])),
         section("The case file", folded("case.yaml", element("pre", run.case_text))),
     ]
-    return page(run.case.title, _header(run, parts), *parts)
+    top = section("Summary", *_top_of(run, leading, budget))
+    return page(run.case.title, _header(run), top, contents_of(parts), *parts)
 
 
-def _header(run: ReportData, parts: Sequence[Html]) -> Html:
+def _header(run: ReportData) -> Html:
     version = run.summary["versions"]["fretscale"]
-    what = (type(run.case).__doc__ or "").partition("\n")[0]
-    lead = f"{what} Computed by fretscale {version}"
-    warnings = len(run.summary["warnings"])
-    counted = f"{warnings} warning{'s' * (warnings != 1)}" if warnings else "no warnings"
-    return element(
-        "header",
-        element("h1", run.case.title),
-        element("p", f"{lead}; {counted}{_met(run)}.", cls="lead"),
-        contents_of(parts),
-    )
+    lead = f"Case of kind {run.kind}: {run.case.about}. Computed by fretscale {version}."
+    return element("header", element("h1", run.case.title), element("p", lead, cls="lead"))
 
 
-def _met(run: ReportData) -> str:
-    found = _verdicts(run)
-    if not found:
-        return ""
-    met = sum(isinstance(verdict, Verdict) and verdict.met for verdict in found)
-    return f"; {met} of {len(found)} expectations met"
+# --- summary ------------------------------------------------------------------------------------
+
+
+def _top_of(run: ReportData, leading: Html, budget: Html) -> Iterator[Html]:
+    """Yield what a reader without knowledge of the run needs first."""
+    yield element("p", unparted(typeset(run.case.question)))
+    if leading:
+        yield element("h3", "Main results")
+        yield leading
+    kinds = [kind for kind in kinds_in(run.summary["warnings"]) if kind.is_on_results]
+    yield element("h3", "Warnings")
+    if kinds:
+        yield items(_counted(kind, run.summary["warnings"]) for kind in kinds)
+    else:
+        yield element("p", "The run gave no warning about its results.")
+    if places := list(_places(run, budget)):
+        yield element("h3", "What to look at")
+        yield items(places)
+
+
+def _counted(kind: WarningKind, warnings: Sequence[str]) -> Html:
+    """Return the title of a kind of warning, with a link to its explanation."""
+    count = sum(kind.code in warning for warning in warnings)
+    several = f" ({count} warnings)" if count > 1 else ""
+    return element("span", link(kind.code, kind.code), f": {kind.title}{several}.")
+
+
+def _places(run: ReportData, budget: Html) -> Iterator[Html]:
+    """Yield links to figures and sections, each with what it shows."""
+    for name in list(run.figures)[:FIRST_FIGURES]:
+        yield element("span", "Figure: ", link(figure_key(name), title_of(run.figures[name])))
+    if budget:
+        text = " says which part of the computation each error comes from."
+        yield element("span", link("error-budget", "Error budget"), text)
+    if found := _verdicts(run):
+        met = sum(isinstance(verdict, Verdict) and verdict.met for verdict in found)
+        text = f": {met} of {len(found)} expectations met."
+        yield element("span", link("expectations", "Expectations"), text)
+    if rows := list(_compared(run.summary)):
+        text = f": {counted(len(rows), 'curve')} compared with measured points."
+        yield element("span", link("measured", "Measured"), text)
 
 
 # --- sections -----------------------------------------------------------------------------------
@@ -131,21 +166,31 @@ def _warnings(warnings: Sequence[str]) -> Html:
         if not colon or (" " in place and alike[rest] == 1):
             place, rest = "", warning
         places.setdefault(typeset(rest), []).append(typeset(place))
+    kinds = kinds_in(warnings)
     texts = (
         element("span", element("strong", "; ".join(those)), ": ", rest) if any(those) else rest
-        for rest, those in places.items()
+        for rest, those in ((_linked(text, kinds), at) for text, at in places.items())
     )
-    return lines([items(texts), *_explained(warnings)]) if places else Html("")
+    return lines([items(texts), *_explained(kinds)]) if places else Html("")
 
 
-def _explained(warnings: Sequence[str]) -> Iterator[Html]:
+def _linked(text: str, kinds: Sequence[WarningKind]) -> Html:
+    """Return the text of a warning, whose codes lead to their explanations."""
+    shown = html(text)
+    for kind in kinds:
+        shown = Html(shown.replace(kind.code, link(kind.code, kind.code)))
+    return shown
+
+
+def _explained(kinds: Sequence[WarningKind]) -> Iterator[Html]:
     """Yield a table of what the codes of the warnings mean, and what to do."""
     rows = [
-        [kind.code, f"{kind.title}. {kind.meaning}", kind.remedy] for kind in kinds_in(warnings)
+        [element("span", kind.code, id=kind.code), f"{kind.title}. {kind.meaning}", kind.remedy]
+        for kind in kinds
     ]
     if rows:  # warnings of older versions have no codes
-        explanations = table(["code", "meaning", "what to do"], rows, stacks=True)
-        yield folded("What the warnings mean", explanations)
+        yield element("h3", "What the warnings mean")
+        yield table(["code", "meaning", "what to do"], rows, stacks=True)
 
 
 def _verdicts(run: ReportData) -> list[Verdict | str]:
@@ -187,28 +232,32 @@ def _verdict_cells(verdict: Verdict | str, quantity: SummaryQuantity | None) -> 
     met = (
         element("span", "met", cls="good") if verdict.met else element("span", "missed", cls="bad")
     )
-    expected, computed = (
-        _as_expected(value, verdict.unit, quantity)
-        for value in (verdict.expected, verdict.computed)
-    )
     tolerance = verdict.entry.tolerance
-    if verdict.expected:
-        errors = percent(verdict.error), exact_percent(tolerance)
-    else:  # the error of an expected value 0 is absolute
-        errors = f"{verdict.error:.2g}", f"{tolerance:.2g}"
+    expected = _as_expected(verdict.expected, verdict.unit, quantity, GIVEN)
+    computed = _as_expected(verdict.computed, verdict.unit, quantity, tolerance)
+    # A limit is not rounded. The error of an expected value 0 is absolute.
+    scale, mark = (100.0, " %") if verdict.expected else (1.0, "")
+    off = readable(scale * verdict.error, "1", 1.0)
+    errors = f"{off}{mark}", f"{scale * tolerance:.{ALL_DIGITS}g}{mark}"
     return [*(unbroken(number(text)) for text in (expected, computed, *errors)), met]
 
 
-def _as_expected(value: float, unit: str, quantity: SummaryQuantity | None) -> str:
-    """Return a value in the unit of the expectation, or, for a bare number, of the quantity."""
+def _as_expected(
+    value: float, unit: str, quantity: SummaryQuantity | None, tolerance: float
+) -> str:
+    """Return a value in the unit of the expectation, or, for a bare number, of the quantity.
+
+    Its digits are those that the tolerance decides on.
+    """
     if unit or quantity is None:
-        return f"{readable(value, '1', GIVEN).number} {pretty(unit)}".strip()
-    return str(readable(value, quantity.unit, GIVEN, quantity.everyday))
+        shown = readable(value, "1", tolerance, most=ALL_DIGITS).number
+        return f"{shown} {pretty(unit)}".strip()
+    return str(readable(value, quantity.unit, tolerance, quantity.everyday, ALL_DIGITS))
 
 
 def _measured(summary: Mapping[str, Any]) -> Html:
-    found = summary.get("measured", ())
-    rows = [_measured_cells(one) for one in found if "rms_deviation" in one]
+    found = list(_compared(summary))
+    rows = [_measured_cells(one) for one in found]
     if not rows:
         return Html("")
     head = ["", "points", "mean", "rms", "rms, relative", "chi² per point", "most at", "from"]
@@ -216,7 +265,7 @@ def _measured(summary: Mapping[str, Any]) -> Html:
         "Computed minus measured, with straight lines between computed points. Relative is over "
         "the rms of what was measured. A chi² of 1 is the scatter that the deviations give."
     )
-    if any(one["nearest_of_several_branches"] for one in found if "refused" not in one):
+    if any(one["nearest_of_several_branches"] for one in found):
         explained += (
             " Of several branches of a curve the nearest one counts, so the difference may be "
             "too small."
@@ -224,6 +273,11 @@ def _measured(summary: Mapping[str, Any]) -> Html:
     return lines(
         [table(head, rows, numbers=(1, 2, 3, 4, 5, 6), stacks=True), html(note(explained))]
     )
+
+
+def _compared(summary: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """Yield the comparisons with measured points that were possible."""
+    yield from (one for one in summary.get("measured", ()) if "rms_deviation" in one)
 
 
 def _measured_cells(one: Mapping[str, Any]) -> list[object]:
@@ -244,7 +298,7 @@ def _measured_cells(one: Mapping[str, Any]) -> list[object]:
 
 def _figures(run: ReportData) -> Iterator[Html]:
     for name, svg in run.figures.items():
-        yield picture(svg, name.replace("_", " ").capitalize())
+        yield picture(svg, name, name.replace("_", " ").capitalize())
     if not run.figures:
         yield note(
             "The run drew no figures (output.figures); ",

@@ -1,6 +1,7 @@
 """Main results of every analysis exist as numbers, in the units of its datasets."""
 
 import json
+import re
 from pathlib import Path
 
 import h5py
@@ -16,10 +17,14 @@ from tests.workflow.shell.test_kills import PADS_THAT_WEAR
 from tests.workflow.vibration.time_scenes import JOINT
 from workflow.analyses.wear.output.quantities import _load_ranges
 from workflow.analyses.wear.worn.worn_structure import load_ranges
+from workflow.case.text.readable import readable
+from workflow.case.text.typeset import number, typeset, unparted
 from workflow.case.units import to_base
 from workflow.kinds import ANALYSES, analyses, analysis_of, load_case
-from workflow.report.page import html
-from workflow.report.writing import write_report
+from workflow.messages.warning_kinds import kinds_in
+from workflow.report.page import html, unbroken
+from workflow.report.run_page import run_page
+from workflow.report.writing import report_data_of, write_report
 from workflow.shell.output.summary import required_number
 
 QUIET = ("output.figures=false", "output.paraview=false")
@@ -44,6 +49,8 @@ CASES_OF = {
     "vibration_wear": PADS_THAT_WEAR,
 }
 QUICK = "contact", "vibration"
+# Number of quantities that a reader takes in at a glance.
+MOST_LEADING = 8
 
 
 def run(folder: Path, text: str, *overrides: str) -> Path:
@@ -78,6 +85,19 @@ def test_main_results_are_numbers_in_the_units_of_the_results(tmp_path, name):
     assert analysis_of(case).name == name
     quantities = analysis_of(case).quantities(case, summary)
     assert len(quantities) >= 4
+    leading = [quantity for quantity in quantities if quantity.leading]
+    assert 0 < len({quantity.name for quantity in leading}) <= MOST_LEADING
+    text = run_page(report_data_of(out, figures=False))
+    top = text.partition("<nav>")[0]
+    assert html(unparted(typeset(case.question))) in top
+    links = set(re.findall(r'href="#([^"]+)"', text))
+    assert {kind.code for kind in kinds_in(summary["warnings"])} <= links
+    assert links <= set(re.findall(r' id="([^"]+)"', text))
+    for quantity in leading:
+        value = required_number(summary, quantity.path)
+        shown = readable(value, quantity.unit, quantity.error, quantity.everyday)
+        assert html(quantity.name) in top
+        assert unbroken(number(str(shown))) in top
     assert len({q.path for q in quantities}) == len({(q.group, q.name) for q in quantities})
     units, compared = units_of(out / "results.h5"), 0
     for quantity in quantities:
@@ -93,7 +113,7 @@ def test_main_results_are_numbers_in_the_units_of_the_results(tmp_path, name):
     if name not in QUICK:
         page = write_report(out).read_text("utf-8")
         assert all(html(quantity.name) in page for quantity in quantities)
-        assert page.count("<figure>") > 1
+        assert page.count("<figure ") > 1
 
 
 def test_every_analysis_has_its_case_here():

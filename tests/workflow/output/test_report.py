@@ -22,6 +22,7 @@ from workflow.analyses.wear.output.layout import WearContents as WearContents
 from workflow.case.text.readable import readable
 from workflow.errors import UserError
 from workflow.layout.declared import Layout
+from workflow.report.page import title_of
 from workflow.report.run_page import AT_ONCE
 from workflow.report.writing import write_report
 from workflow.shell.folders.folder import OutputFolder
@@ -32,7 +33,7 @@ EXPECT = """\
 assumed: [friction]
 expect:
   - {quantity: states.-1.P, value: 400 N, tolerance: 1e-6, kind: closed_form, source: "given <b>"}
-  - {quantity: states.-1.peak_pressure, value: 1 GPa, tolerance: 1 %, kind: earlier, source: none}
+  - {quantity: states.-1.peak_pressure, value: 1 GPa, tolerance: 1.255 %, kind: earlier, source: no}
   - {quantity: states.7.P, value: 1 N, tolerance: 1 %, kind: earlier, source: none}
 """
 CASE = BALL.replace("title: Ball", f"title: '{TITLE}'") + EXPECT
@@ -42,13 +43,14 @@ VOID = {"meta", "img", "wbr"}
 
 
 class Page(HTMLParser):
-    """Parser of a report: closed elements, texts by their heading, links, and images."""
+    """Parser of a report: closed elements, texts by their heading, links, names, and images."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
         self.open: list[str] = []
         self.reported: dict[str, str] = {}
         self.links: list[str] = []
+        self.names: list[str] = []
         self.images: list[str] = []
         self.tags: set[str] = set()
         self._heading = ""
@@ -60,6 +62,7 @@ class Page(HTMLParser):
         self.tags.add(tag)
         given = dict(attrs)
         self.links += [given[name] for name in ("href", "action") if name in given]
+        self.names += [given["id"]] if "id" in given else []
         self.images += [given["src"]] if "src" in given else []
         assert not [name for name in given if name.startswith("on")]
         if tag not in VOID:
@@ -96,14 +99,20 @@ def test_the_page_is_complete_and_self_contained(drawn):
     assert manifest_has_all(drawn)
     assert page.reported[TITLE]
     assert "script" not in page.tags
-    assert all(link.startswith("#") for link in page.links)
+    assert set(page.links) <= {f"#{name}" for name in page.names}
+    assert len(set(page.names)) == len(page.names)
+    sections = set(page.names) - {"summary"}
+    assert {f"#{name}" for name in sections} <= set(page.links)
+    titles = [title_of(base64.b64decode(image.split(",")[1]).decode()) for image in page.images]
+    assert all(title in page.reported["Contents"] for title in titles)
     assert all(image.startswith("data:image/svg+xml;base64,") for image in page.images)
     assert not re.search(r"https?://|url\(|@import", re.sub(r"base64,[^\"]*", "", text))
     assert "1441 MPa" in page.reported["Results"].replace("\N{NO-BREAK SPACE}", " ")
     expected = page.reported["Expectations"]
     assert ("met" in expected, "missed" in expected, "7 is missing" in expected) == (True,) * 3
     assert "given <b>" in expected
-    assert "1 of 3 expectations met" in page.reported[TITLE]
+    assert "1.255 %" in expected.replace("\N{NO-BREAK SPACE}", " ")
+    assert "1 of 3 expectations met" in page.reported["Summary"]
     assert "115 GPa" in page.reported["The case"]
     assert "friction" in page.reported["The case"]
     assert (drawn / "case.yaml").read_text("utf-8") in page.reported["The case file"]
@@ -175,7 +184,17 @@ def test_results_list_their_contents(analysis, tmp_path):
 
 
 READABLE = [
-    ((0.00283, "mm", 0.013), "2.83 µm"),
+    # The second digit of the error is the last one: ± 0.037 µm, ± 0.16 kN, ± 0.10 and ± 370 mm.
+    ((0.00283, "mm", 0.013), "2.830 µm"),
+    ((-31352.7, "N", 0.005), "-31.35 kN"),
+    ((9.9996, "1", 0.00998), "10.00"),
+    ((9.99996, "mm", 0.005), "10.000 mm"),
+    ((123.456, "mm", 3.0), "120 mm"),
+    # Few digits remain of a very large error, and not too many of a very small one.
+    ((0.5, "1", 5.0), "0.50"),
+    ((2.0 / 3.0, "1", 1e-12), "0.666667"),
+    # A given number has all its digits, one of unknown error has four.
+    ((1234.56, "1", 0.0), "1234.56"),
     ((-31352.7, "N"), "-31.35 kN"),
     ((628.318530718, "rad/s"), "6000 rpm"),
     ((1e-8, "1/MPa"), "10000 µm³/J"),

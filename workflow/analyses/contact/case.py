@@ -328,6 +328,13 @@ class BodiesCase(Case):
         check_surfaces(self.structure, self.contact.centred())
         return self
 
+    @property
+    def question(self) -> str:
+        return (
+            f"Where do two bodies ({self.structure.text}) touch, stick and slip, and under which "
+            f"pressure and shear? Load: {', '.join(self.load_path.ranges())}."
+        )
+
     def outline(self) -> list[tuple[str, str]]:
         table, grid = self.load_path.table(), self.contact.centred()
         (nx, ny), (dx, dy) = grid.shape, grid.pitch

@@ -286,32 +286,50 @@ class SpecimensCase(WithScans, Case):
             (face,) = self.meshed().interfaces
             yield ScannedFace("pad", KEY, self.structure.surfaces, self.pad_grid, face)
 
+    @property
+    def question(self) -> str:
+        return (
+            f"How far do two specimens wear each other within {self._end}, and how does that "
+            f"change their tangential stiffness? Load: {self._loads}."
+        )
+
+    @property
+    def _end(self) -> str:
+        """End of the wear under each normal force, as text."""
+        wear = self.wear
+        if wear.cycles:
+            return f"{times(wear.cycles)} cycles"
+        return f"{1e-3 * (wear.energy or 0.0):g} J of dissipated energy"
+
+    @property
+    def _loads(self) -> str:
+        """Normal forces and stroke, as text."""
+        loads = self.load_path.normal_forces
+        forces, stroke = ", ".join(f"{f:g}" for f in loads), plain(self.load_path.stroke, "mm")
+        return f"{forces} N{' in turn' * (len(loads) > 1)}, stroke {stroke}"
+
     def outline(self) -> list[tuple[str, str]]:
         form, wear = self.structure.form, self.wear
         pad = self.structure.strip_width
         shape = "flat"
         if form is not None:
             shape = f"radii {plain(form.along, 'mm')} and {plain(form.across, 'mm')}"
-        loads = self.load_path.normal_forces
-        forces, several = ", ".join(f"{force:g}" for force in loads), len(loads) > 1
+        each = " each" * (len(self.load_path.normal_forces) > 1)
         nodes = (self.mesh.pad_elements + 1) ** 2
-        end = (
-            f"{times(wear.cycles)} cycles" if wear.cycles else f"{1e-3 * (wear.energy or 0.0):g} J"
-        )
         fraction, cycles = wear.step.fraction, wear.step.cycles
         block = (
             f"{shares(fraction)} of their limit" if cycles is None else f"{times(cycles)} cycles"
         )
-        cells, stroke = " x ".join(map(str, self.contact.grid)), plain(self.load_path.stroke, "mm")
+        cells = " x ".join(map(str, self.contact.grid))
         return [
             ("structure", f"pads of {pad:g} x {pad:g} mm with {nodes} nodes, {shape}"),
             *(row for face in self.scanned() for row in face.outline()),
-            ("load path", f"{forces} N{' in turn' * several}, stroke {stroke}"),
+            ("load path", self._loads),
             *of_bodies("material", self.materials),
             ("friction", f"{self.friction.coefficient:g}"),
             ("contact", f"reduced specimens; for comparison {cells} cells on a half-space"),
             *wearing({"body_1": wear.body_1, "body_2": wear.body_2}),
-            ("wear", f"{end}{' each' * several}, in cycle blocks of {block}"),
+            ("wear", f"{self._end}{each}, in cycle blocks of {block}"),
         ]
 
     def plausibility_warnings(self) -> Iterator[Notice]:

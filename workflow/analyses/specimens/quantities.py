@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.models.stress.layout import MOMENTS
 from workflow.shell.analysis import Summary
-from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+from workflow.shell.output.quantities import CurvesOf, NumberOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, reported
 
 FREE = "free specimens"
-UNCOUPLED = "difference to a cycle with pressure and shear coupled"
-# Quantities of the pads, unworn and worn: unit, text, everyday unit.
+UNCOUPLED = "the difference to a cycle with pressure and shear coupled"
+# Quantities of the pads, unworn and worn.
 STATE = {
-    "stick_stiffness": ("N/mm", "tangential stiffness, all that touches stuck", "N/um"),
-    "secant_stiffness": ("N/mm", "slope of the loop up to half of its force", "N/um"),
-    "area": ("mm^2", "contact area", ""),
-    "peak_pressure": ("MPa", "largest pressure", ""),
-    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+    "stick_stiffness": NumberOf(
+        "N/mm", "tangential stiffness while nothing slips", "N/um", leading=True
+    ),
+    "secant_stiffness": NumberOf("N/mm", "slope of the loop up to half of its force", "N/um"),
+    "area": NumberOf("mm^2", "contact area"),
+    "peak_pressure": NumberOf("MPa", "largest pressure", leading=True),
+    "energy_per_cycle": NumberOf("N mm", "energy dissipated in a cycle"),
+}
+# Quantities of each body.
+WORN = {
+    "depths": NumberOf("mm", "largest depth worn", leading=True),
+    "volumes": NumberOf("mm^3", "volume worn", leading=True),
 }
 # Results of the unworn pads that are compared with a coupled cycle.
 COUPLED = {"secant_stiffness": "secant_stiffness", "energy_per_cycle": "energy"}
@@ -51,20 +57,21 @@ def main_results(case: SpecimensCase, summary: Summary) -> list[SummaryQuantity]
 
 def _under(group: str, number: int, summary: Summary) -> Iterator[SummaryQuantity]:
     """Yield results under one normal force."""
-    of, load = partial(SummaryQuantity, group), f"loads.{number}"
-    for body in (1, 2):
-        yield of(f"largest depth worn from body {body}", f"{load}.depths.{body - 1}", "mm")
-    for body in (1, 2):
-        yield of(f"volume worn from body {body}", f"{load}.volumes.{body - 1}", "mm^3")
-    for name, (unit, text, everyday) in STATE.items():
+    load, leads = f"loads.{number}", number in (0, len(summary["loads"]) - 1)
+    for name, worn in WORN.items():
+        for body in (1, 2):
+            of_body = worn._replace(text=f"{worn.text} from body {body}")
+            yield of_body.at(group, f"{load}.{name}.{body - 1}", leads)
+    for name, declared in STATE.items():
         known = {}
         if beside := COUPLED.get(name):
             path = f"{load}.coupled_cycle.{beside}_difference"
             known = estimate(summary, path, UNCOUPLED)
-        unworn, worn = (f"{load}.{moment}.{name}" for moment in MOMENTS)
-        yield of(f"{text}, unworn", unworn, unit, everyday=everyday, **known)
-        yield of(f"{text}, worn", worn, unit, everyday=everyday)
-    yield of("energy dissipated by all cycles", f"{load}.energy", "N mm")
+        for moment in MOMENTS:
+            of_moment = declared._replace(text=f"{declared.text}, {moment}")
+            path = f"{load}.{moment}.{name}"
+            yield of_moment.at(group, path, leads, **(known if moment == "unworn" else {}))
+    yield NumberOf("N mm", "energy dissipated by all cycles").at(group, f"{load}.energy")
     for name in ("stiffness", "pressure"):
-        text = f"cycles after which {name} is steady"
-        yield of(text, f"{load}.steady.{name}.cycles", "1")
+        steady = NumberOf("1", f"cycles after which {name} is steady")
+        yield steady.at(group, f"{load}.steady.{name}.cycles")

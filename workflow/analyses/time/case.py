@@ -172,12 +172,23 @@ class JointCase(TimeCase):
         check_within(self.energies, self.ageing)
         return self
 
+    @property
+    def question(self) -> str:
+        return (
+            f"How does a friction joint change as it ages {ageing_outline(self.ageing)}? "
+            f"Load: {self.driven}."
+        )
+
+    @property
+    def driven(self) -> str:
+        """Stroke and frequency of the drive, as text."""
+        return f"stroke of {plain(self.drive.stroke, 'mm')} at {self.drive.frequency:g} Hz"
+
     def outline(self) -> list[tuple[str, str]]:
-        drive = self.drive
         return [
             ("structure", "none: the joint alone"),
             *joint_outline(self),
-            ("drive", f"stroke {plain(drive.stroke, 'mm')} at {drive.frequency:g} Hz"),
+            ("drive", self.driven),
             ("ageing", ageing_outline(self.ageing)),
         ]
 
@@ -288,6 +299,11 @@ class RigCase(TimeCase):
     def steps(self) -> float:
         """Number of time steps stored of each motion."""
         return _recorded_time(self.excitation) / self.integration.step
+
+    @property
+    def question(self) -> str:
+        worn = ", and how does wear of the joints change that" * (self.energies[-1] > 0.0)
+        return f"How does a rig with friction joints move{worn}? Load: {excitation_outline(self)}."
 
     def outline(self) -> list[tuple[str, str]]:
         structure = self.structure

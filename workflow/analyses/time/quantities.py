@@ -3,32 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Any
 
 from workflow.analyses.time.case import JointCase, RigCase, joules
 from workflow.analyses.time.outcome import PARAMETERS
+from workflow.case.text.readable import everyday_unit
 from workflow.shell.analysis import Summary
-from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+from workflow.shell.output.quantities import CurvesOf, NumberOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, reported
 
-AGEING, IN_TIME = "jumps in energy, a bound", "displacement, due to the time steps"
-STEADY = "intervals between steady states"
-STIFFNESSES = "stiffness", "residual_stiffness"
-# Quantities of a state in addition to the joint's parameters: unit, text, everyday unit.
+AGEING, IN_TIME = "the jumps in energy, as an upper bound", "the time steps"
+STEADY = "the intervals between steady states"
+# Quantities of a state.
 NUMBERS = {
-    "cycles": ("1", "cycles so far", ""),
-    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
-    "stroke": ("mm", "stroke of the joint, peak to peak", ""),
-    "largest_displacement": ("mm", "largest displacement of the reported point", ""),
-    "dissipated": ("N mm", "energy dissipated in the motion", ""),
-    "first_frequency": ("Hz", "first peak of the response", ""),
-    "first_peak": ("mm/s^2/N", "height of the first peak", "m/s^2/N"),
-    "second_frequency": ("Hz", "second peak of the response", ""),
-    "second_peak": ("mm/s^2/N", "height of the second peak", "m/s^2/N"),
-    "ring_down.largest.damping_ratio": ("1", "damping ratio as the ring-down begins", "%"),
-    "stuck.0": ("Hz", "first natural frequency, joint stuck", ""),
-    "sliding.0": ("Hz", "first natural frequency, joint sliding", ""),
+    "cycles": NumberOf("1", "cycles so far"),
+    "energy_per_cycle": NumberOf("N mm", "energy dissipated in a cycle", leading=True),
+    "stroke": NumberOf("mm", "stroke of the joint, peak to peak"),
+    "largest_displacement": NumberOf(
+        "mm", "largest displacement of the reported point", leading=True
+    ),
+    "dissipated": NumberOf("N mm", "energy dissipated in the motion"),
+    "first_frequency": NumberOf("Hz", "first peak of the response", leading=True),
+    "first_peak": NumberOf("mm/s^2/N", "height of the first peak", "m/s^2/N", leading=True),
+    "second_frequency": NumberOf("Hz", "second peak of the response"),
+    "second_peak": NumberOf("mm/s^2/N", "height of the second peak", "m/s^2/N"),
+    "ring_down.largest.damping_ratio": NumberOf(
+        "1", "damping ratio as the ring-down begins", "%", leading=True
+    ),
+    "stuck.0": NumberOf("Hz", "first natural frequency, joint stuck"),
+    "sliding.0": NumberOf("Hz", "first natural frequency, joint sliding"),
+    **{
+        name: NumberOf(
+            parameter.unit,
+            parameter.description,
+            everyday_unit(parameter.unit, name),
+            leading=name in ("friction", "stiffness"),
+        )
+        for name, parameter in PARAMETERS.items()
+    },
 }
 # Quantities to which the error of time steps applies.
 MOVED = "stroke", "largest_displacement"
@@ -50,9 +62,10 @@ CURVES = (
 
 def main_results(case: JointCase | RigCase, summary: Summary) -> list[SummaryQuantity]:
     """Return results of every state, and of the whole life if the joint ages."""
+    energy = NumberOf("N mm", "energy dissipated", leading=True)
     whole = (
-        SummaryQuantity("whole life", "cycles", "cycles", "1"),
-        SummaryQuantity("whole life", "energy dissipated", "energy", "N mm", **_of_ageing(summary)),
+        NumberOf("1", "cycles", leading=True).at("whole life", "cycles"),
+        energy.at("whole life", "energy", **_of_ageing(summary)),
     )
     states = (
         quantity
@@ -74,17 +87,15 @@ def _of_ageing(summary: Summary) -> dict[str, Any]:
 def _when(number: int, summary: Summary) -> str:
     """Return text for the time of a state; "at the end" for the last one of a joint that ages."""
     ends = "cycles" in summary and number == len(summary["states"]) - 1
-    return "at the end" if ends else f"at {joules(summary['states'][number]['energy'])}"
+    energy = joules(summary["states"][number]["energy"])
+    return "at the end" if ends else f"after {energy} dissipated"
 
 
 def _of_state(number: int, when: str, summary: Summary) -> Iterator[SummaryQuantity]:
-    of, place = partial(SummaryQuantity, when), f"states.{number}"
+    place, ends = f"states.{number}", (0, len(summary["states"]) - 1)
     in_time = estimate(summary, f"{place}.step_error", IN_TIME)
-    for name, (unit, text, everyday) in NUMBERS.items():
+    for name, declared in NUMBERS.items():
         known = in_time if name in MOVED else {}
         if name == "cycles":
             known = _of_ageing(summary)
-        yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
-    for name, parameter in PARAMETERS.items():
-        everyday = "N/um" if name in STIFFNESSES else ""
-        yield of(parameter.description, f"{place}.{name}", parameter.unit, everyday=everyday)
+        yield declared.at(when, f"{place}.{name}", number in ends, **known)

@@ -192,11 +192,23 @@ class VibrationWearCaseBase(VibrationCaseBase):
         assert amount is not None
         return amount
 
+    @property
+    def question(self) -> str:
+        return (
+            f"How does the vibration of a rig change as {self.worn_by} wear its contact for "
+            f"{times(self.wear.cycles[-1])} cycles? Load: {self.driving}."
+        )
+
+    @property
+    def worn_by(self) -> str:
+        """Force or level that wears the contact, and its frequency, as text."""
+        return f"{self.amount.as_text(self.wearing)} {self.wear.where}"
+
     def outline(self) -> list[tuple[str, str]]:
         structure, wear = self.structure, self.wear
         return [
             *structure_outline(structure),
-            ("worn by", f"{self.amount.as_text(self.wearing)} {wear.where}"),
+            ("worn by", self.worn_by),
             ("states", f"unworn and after {'; '.join(map(times, wear.cycles))} cycles"),
             ("forces", self.driving),
             ("method", self.resolved),

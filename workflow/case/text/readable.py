@@ -1,6 +1,6 @@
 """Numbers in base units as readable text: 0.00283 mm is 2.83 µm.
 
-The number of digits follows from the estimated error.
+The second digit of the estimated error is the last one shown: 2.830 ± 0.021 µm.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ SHOWN: dict[str, tuple[tuple[str, float], ...]] = {
     "mm": (("nm", 0.0), ("um", 0.1), ("mm", 0.1), ("m", 10.0)),
     "mm^2": (("um^2", 0.0), ("mm^2", 1e-3)),
     "mm^3": (("um^3", 0.0), ("mm^3", 1e-3)),
+    "mm^3/mm": (("um^3/mm", 0.0), ("mm^3/mm", 1e-3)),
     "N": (("mN", 0.0), ("N", 0.1), ("kN", 1.0), ("MN", 1.0)),
     "N/mm": (("N/mm", 0.0), ("kN/mm", 10.0)),
     "N*mm": (("uJ", 0.0), ("mJ", 0.1), ("J", 1.0), ("kJ", 1.0), ("MJ", 1.0)),
@@ -36,8 +37,8 @@ EVERYDAY = {
     "N/mm": (("stiffness", "N/um"), ("springs", "N/um")),
 }
 # Digits if the error is unknown, and the least and most digits; counts below LARGEST_COUNT are
-# shown in full.
-DIGITS, LEAST_DIGITS, MOST_DIGITS = 4, 2, 6
+# shown in full, and given numbers with ALL_DIGITS.
+DIGITS, LEAST_DIGITS, MOST_DIGITS, ALL_DIGITS = 4, 2, 6, 12
 LARGEST_COUNT = 1e10
 POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -52,15 +53,22 @@ class Readable(NamedTuple):
         return f"{self.number} {self.unit}".strip()
 
 
-def readable(value: float, unit: str, error: float | None = None, everyday: str = "") -> Readable:
+def readable(
+    value: float,
+    unit: str,
+    error: float | None = None,
+    everyday: str = "",
+    most: int = MOST_DIGITS,
+) -> Readable:
     """Return ``value``, in the base ``unit``, as text in a suitable unit, or in ``everyday``.
 
-    The relative ``error`` limits the digits. Values that are not finite become words.
+    The relative ``error`` limits the digits, of which there are at most ``most``. Values that are
+    not finite become words.
     """
     if not math.isfinite(value):
         return Readable("not a number" if math.isnan(value) else "infinite", "")
     shown, factor = suited(value, unit, everyday)
-    return Readable(_text(value / factor, error, whole=not shown), shown)
+    return Readable(_text(value / factor, error, not shown, most), shown)
 
 
 def everyday_unit(unit: str | None, name: str) -> str:
@@ -91,7 +99,7 @@ def percent(share: float) -> str:
         return "0 %"
     if abs(share) < 1e-4:
         return "< 0.01 %"
-    digits = max(0, 1 - math.floor(math.log10(abs(100.0 * share))))
+    digits = max(0, 1 - _exponent(100.0 * share, 2))
     return f"{100.0 * share:.{min(digits, 2)}f} %"
 
 
@@ -107,22 +115,26 @@ def suited_unit(value: float, unit: str) -> str:
     return fitting
 
 
-def _text(value: float, error: float | None, whole: bool) -> str:
-    """Return a number down to the first digit of its error; a ``whole`` count has all digits."""
+def _exponent(value: float, digits: int) -> int:
+    """Return the power of ten of the first digit of a number that is rounded to ``digits``."""
+    return int(f"{value:.{digits - 1}e}".partition("e")[2])
+
+
+def _text(value: float, error: float | None, whole: bool, most: int) -> str:
+    """Return a number down to the second digit of its error; a ``whole`` count has all digits."""
     if value == 0.0:
         return "0"
     digits = DIGITS
     if whole and value == round(value) and abs(value) < LARGEST_COUNT and not error:
         return f"{value:.0f}"
     if error:
-        # 2.83 ± 0.04 has three digits, 9.9 ± 0.1 two.
-        last = math.floor(math.log10(abs(value) * error))
-        known = math.floor(math.log10(abs(value))) - last + 1
-        digits = min(MOST_DIGITS, max(LEAST_DIGITS, known))
+        last = _exponent(value * error, 2) - 1
+        first = _exponent(round(value, -last) or value, most)
+        digits = min(most, max(LEAST_DIGITS, first - last + 1))
     elif error is not None:
-        digits = MOST_DIGITS
+        digits = most
     text, power = _plain(value, digits)
-    if (not error or digits == MOST_DIGITS) and "." in text:  # trailing zeros carry no information
+    if (not error or digits == most) and "." in text:  # trailing zeros carry no information
         text = text.rstrip("0").rstrip(".")
     return text + power
 
@@ -130,7 +142,7 @@ def _text(value: float, error: float | None, whole: bool) -> str:
 def _plain(value: float, digits: int) -> tuple[str, str]:
     """Return the number with this many digits, and the power of ten if one is needed to read it."""
     rounded = float(f"{value:.{digits}g}")
-    exponent = math.floor(math.log10(abs(rounded)))
+    exponent = _exponent(rounded, digits)
     if -4 <= exponent < 7:
         return f"{rounded:.{max(0, digits - 1 - exponent)}f}", ""
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")

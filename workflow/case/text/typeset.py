@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-from workflow.case.text.readable import percent
-
 MINUS = "\N{MINUS SIGN}"
 # A hyphen before a number: after nothing, a space, a bracket or the like, not within a word.
 NEGATIVE = re.compile(r"(?<![\w.)\]-])-(?=\.?\d)")
@@ -48,11 +46,6 @@ def unparted(text: str) -> str:
 def given(text: str) -> str:
     """Return an entry of a case, typeset as numbers if it consists of them."""
     return number(text) if QUANTITIES.fullmatch(text) else text
-
-
-def exact_percent(share: float) -> str:
-    """Return a share in per cent, unrounded however small, since limits must not be rounded."""
-    return percent(share) if share >= 1e-4 or share == 0.0 else f"{100.0 * share:.2g} %"
 
 
 def _power_of_ten(found: re.Match[str]) -> str:

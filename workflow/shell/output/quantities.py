@@ -7,6 +7,7 @@ compares runs.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 # Parts of a path in the results: any group, one curve for each, and the last numbered group.
 ANY, LAST = "*", "-1"
@@ -21,7 +22,7 @@ class SummaryQuantity:
     covers. ``everyday`` is the unit preferred by readers, if there is only one. ``budget``
     describes the error in words, with the path in the summary of its parts (None for unknown ones)
     and their ``total``. ``where`` is the place in the run to which the number belongs, such as
-    increment 7.
+    increment 7. A ``leading`` quantity is in the summary at the top of a report.
     """
 
     group: str
@@ -33,6 +34,26 @@ class SummaryQuantity:
     everyday: str = ""
     budget: tuple[str, str] | None = None
     where: str = ""
+    leading: bool = False
+
+
+class NumberOf(NamedTuple):
+    """Declaration of a number that several groups of a summary have: see the fields above."""
+
+    unit: str
+    text: str
+    everyday: str = ""
+    leading: bool = False
+
+    def at(self, group: str, path: str, leads: bool = True, **known: Any) -> SummaryQuantity:
+        """Return the quantity of a ``group`` at a ``path``, leading only if its group ``leads``.
+
+        ``known`` are further fields of the quantity, such as its error.
+        """
+        leading = self.leading and leads
+        return SummaryQuantity(
+            group, self.text, path, self.unit, everyday=self.everyday, leading=leading, **known
+        )
 
 
 @dataclass(frozen=True)

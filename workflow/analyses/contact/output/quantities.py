@@ -6,7 +6,7 @@ from workflow.analyses.contact.case import BodiesCase
 from workflow.analyses.contact.output.layout import LAYOUT
 from workflow.layout.declared import unit_in
 from workflow.shell.analysis import Summary
-from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+from workflow.shell.output.quantities import CurvesOf, NumberOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, reported
 
 LAST, LOOP = "after the last increment", "last closed cycle"
@@ -18,22 +18,22 @@ MOTIONS = {
     "tilt_y": "tilt about y",
     "twist": "twist about z",
 }
-# Quantities of a contact over an area or a line, which has half widths: unit and description.
+# Quantities of a contact over an area or a line, which has half widths.
 NUMBERS = {
-    "peak_pressure": ("MPa", "largest pressure"),
-    "central_pressure": ("MPa", "pressure in the middle"),
-    "contact_radius": ("mm", "contact radius (of a disk of equal area)"),
-    "contact_half_width": ("mm", "contact half width"),
-    "contact_area": ("mm^2", "contact area"),
-    "peak_shear": ("MPa", "largest shear"),
-    "stick_radius": ("mm", "stick radius (of a disk of equal area)"),
-    "stick_half_width": ("mm", "stick half width"),
-    "cumulative_energy": ("N mm", "energy dissipated so far"),
+    "peak_pressure": NumberOf("MPa", "largest pressure", leading=True),
+    "central_pressure": NumberOf("MPa", "pressure in the middle"),
+    "contact_radius": NumberOf("mm", "contact radius (of a disk of equal area)", leading=True),
+    "contact_half_width": NumberOf("mm", "contact half width", leading=True),
+    "contact_area": NumberOf("mm^2", "contact area"),
+    "peak_shear": NumberOf("MPa", "largest shear", leading=True),
+    "stick_radius": NumberOf("mm", "stick radius (of a disk of equal area)", leading=True),
+    "stick_half_width": NumberOf("mm", "stick half width", leading=True),
+    "cumulative_energy": NumberOf("N mm", "energy dissipated so far"),
 }
 # Forces and motions below this share of the largest are rounding.
 ROUNDING = 1e-9
 FORCES = "P", "Qx", "Qy"
-BY_INCREMENTS = "of the increments of the load"
+BY_INCREMENTS = "the increments of the load"
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
     CurvesOf("pressure along x in the middle, last increment", "contact/bodies/-1/pressure"),
@@ -48,25 +48,29 @@ def main_results(case: BodiesCase, summary: Summary) -> list[SummaryQuantity]:
     last, loop = summary["states"][-1], summary["loop"] or {}
     line, history = "contact_half_width" in last, LAYOUT.datasets("history")
 
-    def of(text: str, path: str, unit: str, where: str = LAST) -> SummaryQuantity:
+    def of(
+        text: str, path: str, unit: str, where: str = LAST, leading: bool = False
+    ) -> SummaryQuantity:
         place = "loop" if where == LOOP else "last"
         error = f"increments_error.{place}.{path.rpartition('.')[2]}"
-        return SummaryQuantity(where, text, path, unit, **estimate(summary, error, BY_INCREMENTS))
+        known = estimate(summary, error, BY_INCREMENTS)
+        return SummaryQuantity(where, text, path, unit, leading=leading, **known)
 
     quantities = [
         of(f"{history[name].description}, {name}", f"states.-1.{name}", history[name].unit_in(line))
         for name in _large(last, FORCES)
     ]
     quantities += [
-        of(MOTIONS[name], f"states.-1.{name}", history[name].unit)
+        of(MOTIONS[name], f"states.-1.{name}", history[name].unit, leading=name == "approach")
         for name in _large(last, ("approach", "shift_x", "shift_y"))
     ]
-    for name, (unit, text) in NUMBERS.items():
-        quantities.append(of(text, f"states.-1.{name}", unit_in(line, unit)))
+    for name, number in NUMBERS.items():
+        unit = unit_in(line, number.unit)
+        quantities.append(of(number.text, f"states.-1.{name}", unit, leading=number.leading))
     if loop:
         force, motion = history[loop["force"]], loop["motion"]
         quantities += [
-            of("energy dissipated", "loop.energy", unit_in(line, "N mm"), LOOP),
+            of("energy dissipated", "loop.energy", unit_in(line, "N mm"), LOOP, leading=True),
             of(f"amplitude of the {MOTIONS[motion]}", "loop.amplitude", history[motion].unit, LOOP),
             of(
                 f"amplitude of the {force.description}",

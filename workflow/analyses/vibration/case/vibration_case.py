@@ -314,6 +314,13 @@ class VibrationCase(DrivenMass):
                 "loops.joints",
             )
 
+    @property
+    def question(self) -> str:
+        return (
+            "How strongly does a structure with friction joints vibrate, and where is its "
+            f"resonance? Load: {self.driving}."
+        )
+
     def outline(self) -> list[tuple[str, str]]:
         return [
             *structure_outline(self.structure),

@@ -9,45 +9,45 @@ from workflow.analyses.vibration.case.excitation import amount_in, under_in
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
 from workflow.models.vibration.amount import LEVEL
 from workflow.shell.analysis import Summary
-from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+from workflow.shell.output.quantities import CurvesOf, NumberOf, SummaryQuantity
 from workflow.shell.output.summary import estimate, reported
 
 LINEAR, RECORDS = "linear limits", "left_out_of_records"
-ERROR = "joints' vibration or energy lost, due to harmonics and samples"
-# Quantities of the motion at resonance: unit, text, everyday unit.
+ERROR = "harmonics and samples, for the vibration of the joints or the energy that they lose"
+# Quantities of the motion at resonance.
 NUMBERS = {
-    "resonance": ("Hz", "resonance", ""),
-    "amplitude": ("mm", "amplitude at resonance", ""),
-    "receptance": ("mm/N", "amplitude over force at resonance", "um/N"),
-    "energy_per_cycle": ("N mm", "energy dissipated in a cycle at resonance", ""),
-    "damping": ("1", "damping ratio at resonance", "%"),
-    "slip": ("1", "share of the cycle in which joints slip", "%"),
+    "resonance": NumberOf("Hz", "resonance", leading=True),
+    "amplitude": NumberOf("mm", "amplitude at resonance", leading=True),
+    "receptance": NumberOf("mm/N", "amplitude over force at resonance", "um/N"),
+    "energy_per_cycle": NumberOf("N mm", "energy dissipated in a cycle at resonance"),
+    "damping": NumberOf("1", "damping ratio at resonance", "%", leading=True),
+    "slip": NumberOf("1", "share of the cycle in which joints slip", "%", leading=True),
 }
 # A resonance's frequency hardly depends on the amplitude, so the error of the motion is not its
 # error.
 WITH_ERROR = "amplitude", "absolute_amplitude", "receptance", "energy_per_cycle"
 LOOP = {
-    "energy": ("N mm", "energy of the loop", ""),
-    "stroke": ("mm", "stroke of the loop", ""),
-    "stiffness": ("N/mm", "stick slope of the loop", "N/um"),
-    "friction": ("1", "friction coefficient of the loop", ""),
+    "energy": NumberOf("N mm", "energy of the loop"),
+    "stroke": NumberOf("mm", "stroke of the loop"),
+    "stiffness": NumberOf("N/mm", "stick slope of the loop", "N/um"),
+    "friction": NumberOf("1", "friction coefficient of the loop"),
 }
 # Quantities at resonance where the ground moves, or the frequency is that of an engine.
 BESIDE = {
-    "absolute_amplitude": ("mm", "absolute amplitude at resonance", ""),
-    "speed": ("rad/s", "speed of the engine at resonance", "rpm"),
+    "absolute_amplitude": NumberOf("mm", "absolute amplitude at resonance", leading=True),
+    "speed": NumberOf("rad/s", "speed of the engine at resonance", "rpm", leading=True),
 }
 # Quantities of a motion at a frequency of the case.
 ANSWER = {
-    "amplitude": ("mm", "amplitude", ""),
-    "absolute_amplitude": ("mm", "absolute amplitude", ""),
-    "phase": ("rad", "phase by which the motion leads the force", "deg"),
-    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+    "amplitude": NumberOf("mm", "amplitude"),
+    "absolute_amplitude": NumberOf("mm", "absolute amplitude"),
+    "phase": NumberOf("rad", "phase by which the motion leads the force", "deg"),
+    "energy_per_cycle": NumberOf("N mm", "energy dissipated in a cycle"),
 }
 # Quantities of a mode over its amplitude.
 MODE = {
-    "linear_frequency": ("Hz", "frequency of the linear mode", ""),
-    "most_damped": ("1", "largest damping ratio", "%"),
+    "linear_frequency": NumberOf("Hz", "frequency of the linear mode"),
+    "most_damped": NumberOf("1", "largest damping ratio", "%", leading=True),
 }
 # Curves by which runs are compared, in addition to the numbers.
 CURVES = (
@@ -73,11 +73,18 @@ def main_results(case: VibrationCase, summary: Summary) -> list[SummaryQuantity]
         )
         for number in range(len(summary.get(RECORDS, ())))
     )
+    last = len(summary["responses"]) - 1
     responses = (
         quantity
         for number, response in enumerate(summary["responses"])
         for quantity in (
-            *of_response(under_in(response), f"responses.{number}", response, summary),
+            *of_response(
+                under_in(response),
+                f"responses.{number}",
+                response,
+                summary,
+                number in (0, last),
+            ),
             *_of(
                 under_in(response),
                 f"responses.{number}.loops.-1",
@@ -99,13 +106,16 @@ def main_results(case: VibrationCase, summary: Summary) -> list[SummaryQuantity]
 
 
 def of_response(
-    group: str, path: str, response: Mapping[str, Any], summary: Summary
+    group: str, path: str, response: Mapping[str, Any], summary: Summary, leads: bool
 ) -> Iterator[SummaryQuantity]:
-    """Yield results of the response to a force or level, at a ``path`` of the summary."""
+    """Yield results of the response to a force or level, at a ``path`` of the summary.
+
+    The summary of a report shows the leading ones only if the response ``leads``.
+    """
     numbers = NUMBERS | {name: reported for name, reported in BESIDE.items() if name in response}
     if amount_in(response)[0] is LEVEL:
-        numbers |= {"receptance": ("mm", "amplitude over level at resonance", "")}
-    return _of(group, path, numbers, WITH_ERROR, summary)
+        numbers |= {"receptance": NumberOf("mm", "amplitude over level at resonance")}
+    return _of(group, path, numbers, WITH_ERROR, summary, leads)
 
 
 def _of_answers(
@@ -119,8 +129,8 @@ def _of_answers(
             which = f", motion {number + 1} of {count}" if count > 1 else ""
             suffix = f" at {answer['frequency']:g} Hz{which}"
             reported = {
-                name: (unit, text + suffix, everyday)
-                for name, (unit, text, everyday) in ANSWER.items()
+                name: declared._replace(text=declared.text + suffix)
+                for name, declared in ANSWER.items()
                 if name in answer["motions"][number]
             }
             yield from _of(group, of, reported, WITH_ERROR, summary)
@@ -129,12 +139,13 @@ def _of_answers(
 def _of(
     group: str,
     path: str,
-    numbers: Mapping[str, tuple[str, str, str]],
+    numbers: Mapping[str, NumberOf],
     with_error: tuple[str, ...],
     summary: Summary,
+    leads: bool = True,
 ) -> Iterator[SummaryQuantity]:
     """Yield results at a ``path`` of the summary; the error there applies to some of them."""
     error = estimate(summary, f"{path}.error", ERROR)
-    for name, (unit, text, everyday) in numbers.items():
+    for name, declared in numbers.items():
         known = error if name in with_error else {}
-        yield SummaryQuantity(group, text, f"{path}.{name}", unit, everyday=everyday, **known)
+        yield declared.at(group, f"{path}.{name}", leads, **known)

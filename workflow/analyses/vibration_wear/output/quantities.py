@@ -14,24 +14,24 @@ from workflow.case.text.plain import times
 from workflow.case.text.readable import everyday_unit
 from workflow.layout.declared import Declarations
 from workflow.shell.analysis import Summary
-from workflow.shell.output.quantities import CurvesOf, SummaryQuantity
+from workflow.shell.output.quantities import CurvesOf, NumberOf, SummaryQuantity
 from workflow.shell.output.summary import number_at, reported
 
-WORN = "depth or volume, by the wear steps, and by harmonics and samples of the motion that wears"
-MOTION = "joints' vibration or energy lost, by harmonics and samples"
-# Quantities of a state, whose units are those of the evolution.
+WORN = "the wear steps, and harmonics and samples of the motion that wears"
+MOTION = "harmonics and samples, for the vibration of the joints or the energy that they lose"
+# Quantities of a state, whose units are those of the evolution, and whether they lead.
 NUMBERS = {
-    "cycles": "cycles under the force that wears",
-    "depth": "largest depth worn, both bodies together",
-    "volume": "volume worn, both bodies together",
-    "energy": "energy dissipated so far",
-    "area": "contact area at rest",
-    "touching": "nodes in contact at rest",
-    "peak_pressure": "largest pressure at rest",
-    "stiffness": "tangential stiffness",
-    "stroke": "stroke under the force that wears",
-    "frequency": "frequency of the motion that wears",
-    "energy_per_cycle": "energy dissipated in a cycle",
+    "cycles": ("cycles under the force that wears", False),
+    "depth": ("largest depth worn, both bodies together", True),
+    "volume": ("volume worn, both bodies together", True),
+    "energy": ("energy dissipated so far", False),
+    "area": ("contact area at rest", False),
+    "touching": ("nodes in contact at rest", False),
+    "peak_pressure": ("largest pressure at rest", True),
+    "stiffness": ("tangential stiffness", True),
+    "stroke": ("stroke under the force that wears", False),
+    "frequency": ("frequency of the motion that wears", False),
+    "energy_per_cycle": ("energy dissipated in a cycle", False),
 }
 # Parts of the error of each quantity, which add up, and a description of that error.
 ERRORS = {
@@ -68,13 +68,14 @@ def _of_state(number: int, declared: Declarations, summary: Summary) -> Iterator
     begun = f"after {times(state['cycles'])} cycles" if state["cycles"] else "unworn"
     group = "at the end" if ends else begun
     place = f"states.{number}"
-    for name, text in NUMBERS.items():
-        unit, known = declared[name].unit, _error(name, place, summary)
-        everyday = everyday_unit(unit, name)
-        yield SummaryQuantity(group, text, f"{place}.{name}", unit, everyday=everyday, **known)
+    leads = ends or number == 0
+    for name, (text, leading) in NUMBERS.items():
+        unit = declared[name].unit
+        shown = NumberOf(unit, text, everyday_unit(unit, name), leading)
+        yield shown.at(group, f"{place}.{name}", leads, **_error(name, place, summary))
     for force, response in enumerate(state["responses"]):
         under = f"{group}, {under_in(response)}"
-        yield from of_response(under, f"{place}.responses.{force}", response, summary)
+        yield from of_response(under, f"{place}.responses.{force}", response, summary, leads)
 
 
 def _error(name: str, place: str, summary: Summary) -> dict[str, Any]:

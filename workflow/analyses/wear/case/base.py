@@ -26,7 +26,7 @@ from workflow.analyses.wear.case.worn_bodies import Worn, wearing
 from workflow.case.fields import shown
 from workflow.case.plausibility import idle_steps, uneven_cells
 from workflow.case.sections import Case, Section, Title, disagreement, entry
-from workflow.case.text.plain import entries, of_bodies, plain, shares, times
+from workflow.case.text.plain import entries, listed, of_bodies, plain, shares, times
 from workflow.messages.warning_kinds import Notice
 from workflow.models.checks.limits import unstable_fraction
 from workflow.models.checks.names import is_group_name
@@ -179,6 +179,19 @@ class WearCase(WithScans, Case):
                     key,
                 )
         return self
+
+    @property
+    @abstractmethod
+    def loads_in_words(self) -> str:
+        """Loads of a cycle, as one line of text."""
+
+    @property
+    def question(self) -> str:
+        bodies = listed([name.replace("_", " ") for name in self.bodies])
+        return (
+            f"How far do {bodies} wear in {times(self.wear.cycles)} cycles, and how does that "
+            f"change the contact pressure? Load: {self.loads_in_words}."
+        )
 
     @abstractmethod
     def loads_outline(self) -> list[tuple[str, str]]:

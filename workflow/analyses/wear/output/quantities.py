@@ -17,7 +17,7 @@ from workflow.shell.output.summary import estimate, number_at, reported
 
 # Source of estimated errors in the report: totals of the error budget.
 BUDGET = "all parts of the error budget below"
-LOOP_ERROR = "grid and increments of the loop; errors of the worn surfaces are not included"
+LOOP_ERROR = "grid and increments of the loop, but not the errors of the worn surfaces"
 STRUCTURE = "structure"
 # Description of element quality, defined as gmsh's gamma.
 QUALITY = "inscribed over circumscribed radius, 1: regular"
@@ -68,17 +68,15 @@ def _worn(case: WearCase, summary: Summary, name: str) -> Iterator[SummaryQuanti
     error = {key: _budgeted(summary, name, key) for key in results}
     for number, body in enumerate(case.bodies, 1):
         text = f"largest depth worn from {named(body)}"
-        yield of(text, f"{name}.depth_{number}", "mm", **error["depth"])
+        yield of(text, f"{name}.depth_{number}", "mm", leading=True, **error["depth"])
     for number, body in enumerate(case.bodies, 1):
-        unit = unit_in(line, "mm^3")
-        yield of(
-            f"volume worn from {named(body)}", f"{name}.volume_{number}", unit, **error["volume"]
-        )
+        text, unit = f"volume worn from {named(body)}", unit_in(line, "mm^3")
+        yield of(text, f"{name}.volume_{number}", unit, leading=True, **error["volume"])
     yield of("worn area", f"{name}.worn_area", unit_in(line, "mm^2"))
     pressures = zip(MOMENTS, ("peak_pressure", "worn_peak_pressure"), strict=True)
     for moment, of_pressure in pressures:
         path = f"{name}.peak_pressure.{moment}"
-        yield of(f"largest pressure, {moment}", path, "MPa", **error[of_pressure])
+        yield of(f"largest pressure, {moment}", path, "MPa", leading=True, **error[of_pressure])
     yield of("contact width along x at peak load, unworn", f"{name}.contact_width.unworn", "mm")
     path = f"{name}.elements_across"
     yield of("elements across the contact at peak load, unworn", path, "1")
@@ -145,11 +143,10 @@ def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[SummaryQu
     for key, (unit, text) in {"von_mises": ("MPa", "von Mises stress"), **PARAMETERS}.items():
         for body in case.bodies:
             for moment in MOMENTS:
-                known = error if key in PARAMETERS and moment == "worn" else {}
+                leading = key in PARAMETERS and moment == "worn"
+                known, whose = (error if leading else {}), f"under the face of {named(body)}"
                 path = f"{name}.stress.{key}.{body}.{moment}.value"
-                yield of(
-                    f"largest {text} under the face of {named(body)}, {moment}", path, unit, **known
-                )
+                yield of(f"largest {text} {whose}, {moment}", path, unit, leading=leading, **known)
 
 
 def _of_loop(summary: Summary, path: str, key: str) -> dict[str, Any]:
@@ -174,7 +171,7 @@ def _of_bolts(summary: Summary) -> Iterator[SummaryQuantity]:
         for moment in MOMENTS:
             text = f"tension at peak load, {moment}"
             yield of(text, f"{path}.tension.{moment}.peak", unit)
-        yield of("share of the tension that is lost", f"{path}.lost", "1")
+        yield of("share of the tension that is lost", f"{path}.lost", "1", leading=True)
 
 
 def _of_structure(summary: Summary) -> Iterator[SummaryQuantity]:
@@ -196,5 +193,5 @@ def _mesh_error(summary: Summary, path: str) -> dict[str, Any]:
     """Return the error of a stress, or a note if the stress grows with every refinement."""
     error = number_at(summary, f"{path}.error")
     if error is not None and error >= 1.0:
-        return {"where": "grows as the mesh is refined"}
-    return estimate(summary, f"{path}.error", "error due to the mesh")
+        return {"where": "mesh-dependent"}
+    return estimate(summary, f"{path}.error", "the mesh")

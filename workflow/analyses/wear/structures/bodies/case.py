@@ -283,12 +283,16 @@ class TwoBodiesWearCase(WearCase):
     def material(self, number: int) -> ElasticMaterial:
         return elastic(getattr(self.materials, self.bodies[number - 1]))
 
+    @property
+    def loads_in_words(self) -> str:
+        return _in_words(self.load_path, "N/mm" if self.line else "N")
+
     def loads_outline(self) -> list[tuple[str, str]]:
-        kind, force = ("line contact", "N/mm") if self.line else ("no finite elements", "N")
+        kind = "line contact" if self.line else "no finite elements"
         return [
             ("structure", f"{self.structure.text}, {kind}"),
             *surfaces_in_words(self.structure, self.grid),
-            ("load path", _in_words(self.load_path, force)),
+            ("load path", self.loads_in_words),
             *([("increments", SPLIT.format(shares(self.contact.accuracy)))] if self.splits else []),
         ]
 

@@ -357,6 +357,10 @@ class DovetailCase(FiniteElementCase):
     def divided(self, legs: Sequence[int]) -> dict[str, Any]:
         return {"load_path.increments": tuple(legs)}
 
+    @property
+    def loads_in_words(self) -> str:
+        return ", ".join(self._peak_loads())
+
     def loads_outline(self) -> list[tuple[str, str]]:
         path, (across, along) = self.load_path, self.mesh.flank_nodes
         nodes = f"{across} x {along}" if self.structure.dimension == 3 else f"{across}"
@@ -367,7 +371,7 @@ class DovetailCase(FiniteElementCase):
             ("flanks", self.structure.flanks),
             *(row for face in self.scanned() for row in face.outline()),
             ("load path", f"{self.increments_outline}{peak}{missions}"),
-            ("peak load", ", ".join(self._peak_loads())),
+            ("peak load", self.loads_in_words),
         ]
         if self.fidelity == "auto":
             by_probes = f"2-D or 3-D and how fine: chosen by probes for {shares(self.accuracy)}"

@@ -232,6 +232,10 @@ class MeshCase(FiniteElementCase):
         before = (max(legs),) * (self.load_path.cycle_from - 1)
         return {"load_path.increments": (*before, *legs)}
 
+    @property
+    def loads_in_words(self) -> str:
+        return "; ".join(load.sized for load in self.structure.loads)
+
     def loads_outline(self) -> list[tuple[str, str]]:
         structure, path = self.structure, self.load_path
         cycles = f", {len(path.mix)} cycles mixed" if path.mix else ""

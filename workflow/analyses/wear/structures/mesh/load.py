@@ -45,11 +45,15 @@ class MeshLoad(Section):
     @property
     def text(self) -> str:
         """The load in a line: kind, size, place and factors of the legs."""
+        return f"{self.sized}, times {in_brackets(self.path)} at the ends of legs"
+
+    @property
+    def sized(self) -> str:
+        """Kind, size and place of the load, as text."""
         kind = self.kind.replace("_", " ")
         sizes = entries(self, ("path", "axis", "through", "at"))
         what = sizes if sizes.startswith(kind) else f"{kind}, {sizes}"
-        path = in_brackets(self.path)
-        return f"{' '.join([what, *self.places])}{self.how}, times {path} at the ends of legs"
+        return f"{' '.join([what, *self.places])}{self.how}"
 
     @property
     def places(self) -> Iterator[str]:

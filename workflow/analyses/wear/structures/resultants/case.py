@@ -239,14 +239,18 @@ class ResultantsCase(WearCase):
     def cores(self) -> int:
         return len(self.loads())
 
+    @property
+    def loads_in_words(self) -> str:
+        file = Path(split_dataset(self.structure.file)[0]).name
+        return f"loads in {self.structure.dimension}-D from {file}"
+
     def loads_outline(self) -> list[tuple[str, str]]:
         loads = self.loads()
         first = next(iter(loads.values()))
         unit = "N/mm" if self.structure.line else "N"
-        file = Path(split_dataset(self.structure.file)[0]).name
         slip = "with" if first.slip is not None else "without"
         return [
-            ("structure", f"loads in {self.structure.dimension}-D from {file}, {slip} slip"),
+            ("structure", f"{self.loads_in_words}, {slip} slip"),
             ("load path", f"{len(first.loads)} increments"),
             *(
                 (
