@@ -19,6 +19,8 @@ BUILT = HERE / "_build"
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent), os.environ.get("PYTHONPATH", "")])
 os.environ |= {"COLUMNS": "100", "NO_COLOR": "1", "TTY_COMPATIBLE": "0", "MPLBACKEND": "agg"}
+# Commands keep what Python compiles of the packages, which otherwise each of them compiles again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ["IPYTHONDIR"] = str(BUILT / "ipython")
 STARTUP = BUILT / "ipython" / "profile_default" / "startup"
 STARTUP.mkdir(parents=True, exist_ok=True)

@@ -41,3 +41,26 @@ def test_a_page_of_a_task_runs_and_prints_an_error(name):
     assert "**The question.**" in text
     assert any("fretscale" in cell and "%%bash" in cell for cell in cells)
     assert any("print(" in cell and "error" in cell for cell in cells)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_a_page_of_a_task_ends_with_what_to_look_at(name):
+    text = (DOCS / "tutorials" / f"{name}.md").read_text(encoding="utf-8")
+    title, advice = text.split("\n## ")[-1].split("\n", 1)
+    assert title == "What to look at"
+    assert re.search(r"`[\w/.]*\.png`", advice)
+    assert re.search(r"\(#fs-w\d{3}\)", advice)
+    assert "error" in advice
+
+
+@pytest.mark.parametrize(("name", "entry"), [("mesh", "pretension"), ("vibration", "wear: {force")])
+def test_a_page_of_a_task_runs_a_case_with_this_entry(name, entry):
+    text = (DOCS / "tutorials" / f"{name}.md").read_text(encoding="utf-8")
+    cells = CELL.findall(text)
+    files = [
+        re.search(r"%%writefile (\S+)", cell)[1]
+        for cell in cells
+        if "%%writefile" in cell and entry in cell
+    ]
+    assert files
+    assert any(f"fretscale run {files[0]}" in cell for cell in cells)

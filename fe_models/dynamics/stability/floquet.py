@@ -185,7 +185,7 @@ class Floquet:
     def stability(self, motion: HarmonicSolution) -> Stability:
         """Return the stability of a motion of the problem, at any resolution."""
         if not isinstance(self._joints, DeviatingJoints):
-            return _unknown("the joint law cannot be linearised about a motion: use one that can")
+            return _unknown("a contact of two bodies cannot be linearised about a motion")
         if self._problem.model.structural is not None:
             return _unknown(
                 "a loss factor is defined for harmonic motion, not for deviations in time: use "

@@ -205,6 +205,10 @@ def test_the_volume_is_that_of_the_dissipated_energy(summary):
     assert summary["volume_per_energy"] == pytest.approx(1.5e-9, rel=BALANCED)
 
 
+def test_no_warning_asks_for_a_stability_that_a_contact_does_not_have(summary):
+    assert not [text for text in summary["warnings"] if "FS-W404" in text]
+
+
 def test_energy_adds_up_from_cycle_to_cycle(tmp_path):
     """Wear dissipates the energy of the intermediate motions, by Simpson's rule."""
     _, contact = contact_in_rig(tmp_path)

@@ -12,6 +12,7 @@ import numpy as np
 from fe_models.dynamics.curves.bifurcations import Bifurcation, find_bifurcations
 from fe_models.dynamics.curves.followed_curve import FollowedCurve
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.joints import DeviatingJoints
 from fe_models.dynamics.stability.floquet import Floquet, Stability
 from sa_solver.types import Array
 from workflow.analyses.vibration.case.vibration_case import VibrationCase
@@ -49,9 +50,13 @@ NOT_LOOKED_FOR = CurveStability({}, {}, ())
 
 
 def looked_for(case: VibrationCase, model: VibratingStructure) -> bool:
-    """Return whether stability is computed: as the case says, or else where it is cheap."""
+    """Return whether stability is computed: as the case says, or else where it is cheap.
+
+    Contacts of the half-space cannot be linearised about a motion.
+    """
     if case.stability == "auto":
-        return Floquet(model.problem).is_fast
+        problem = model.problem
+        return isinstance(problem.joints, DeviatingJoints) and Floquet(problem).is_fast
     return case.stability == "every"
 
 

@@ -94,7 +94,7 @@ class VibrationCase(DrivenMass):
     stability: Literal["auto", "every", "none"] = entry(
         "motions whose stability is computed; auto: every one in structures of up to 64 modes "
         "and 12 directions of joints (in a ring, of all sectors together), because one may take "
-        "a second in larger ones",
+        "a second in larger ones; none with the contact of two bodies that wear",
         "every",
         default="auto",
     )

@@ -71,11 +71,11 @@ ALONG_LINE = ("along x",)
 def figures_of(contents: WearContents) -> Figures:
     """Return the figures of a run, by name; the most important one comes first."""
     drawn = {
+        "bolts": (bolts, bool(contents.bolts)),
         "pressure_profiles": (pressure_profiles, True),
         "pressure_maps": (pressure_maps, not contents.line),
         "worn_profiles": (worn_profiles, contents.worn),
         "kinetics": (kinetics, contents.worn),
-        "bolts": (bolts, bool(contents.bolts)),
         "resultants": (resultants, True),
         "error_budget": (error_budget, True),
         "structure_stress": (structure_stress, contents.structure),
