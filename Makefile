@@ -53,6 +53,7 @@ docs-figures: $(DOCUMENTABLE)
 	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/draw_figures.py out/figures
 	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/validate.py out/validation
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/method_charts.py
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python docs/limit_figures.py
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python docs/cost_charts.py
 
 bench: $(TESTABLE)

@@ -7,9 +7,21 @@ them. A message is one sentence that says what is wrong and what to give or try 
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class FretscaleError(Exception):
     """Base class of all exceptions that fretscale raises on purpose."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what pickles the exception with its cause, which tells the kind of a failure.
+
+        Python pickles no cause, so that an exception of a worker process would lose it.
+        """
+        reduced = super().__reduce__()
+        assert isinstance(reduced, tuple)  # the class and its arguments
+        cause = self.__cause__ if isinstance(self.__cause__, FretscaleError) else None
+        return *reduced[:2], {**vars(self), "__cause__": cause}
 
 
 class InputError(FretscaleError, ValueError):

@@ -66,7 +66,7 @@ class RunChanged(UserError):
     """Stored run whose files are missing, changed, damaged or of another version."""
 
 
-class TooCoarse(UserError):
+class TooCoarse(UserError, InputError):
     """Contact on a single point of its grid or mesh."""
 
 

@@ -1,5 +1,6 @@
 """Tests of two bodies without finite elements that are built and worn in Python."""
 
+import warnings
 from dataclasses import replace
 from math import inf
 
@@ -11,6 +12,8 @@ from sa_solver import InputError, Material
 from tests.conftest import CASES
 from wear import EnergyLaw
 from workflow.analyses.wear.model import wear_model
+from workflow.messages.error_kinds import ErrorKind, error_kind
+from workflow.messages.warning_kinds import WarningKind
 
 TITANIUM, LAW = Material(115e3, 0.29), EnergyLaw(1e-8)
 STROKE = fretscale.LoadTable.stroke(P=50.0, stroke=0.02)
@@ -172,3 +175,38 @@ def test_bodies_that_never_touch_are_warned_of(loads):
     model = fretscale.WearModel(bodies(table), contact(), fretscale.Wear(cycles=10.0))
     with pytest.warns(fretscale.ModelWarning, match="never closed"):
         assert model.run()["interface"]["volume_1"].values[-1] == 0.0
+
+
+def creeping(increments):
+    """Return a cylinder under a cycle whose slip creeps while normal and shear force grow."""
+    loads = fretscale.LoadTable.legs({"P": (80.0, 40.0), "Qx": (20.0, 0.0)}, (increments,) * 2)
+    of = replace(contact((24, 1), method="full"), friction=0.4)
+    return replace(bodies(loads, line=True), size=(0.4, 0.4)), of
+
+
+def test_increments_that_are_too_long_for_friction_are_warned_of():
+    with pytest.warns(fretscale.ModelWarning, match=WarningKind.LONG_INCREMENTS.code):
+        run(*creeping(1))
+
+
+def test_turning_points_suffice_for_similar_bodies_under_constant_pressure():
+    """They are exact in plane strain, so that nothing is warned of."""
+    swing = fretscale.LoadTable.legs({"P": (50.0, 50.0), "Qx": (20.0, -20.0)}, (1, 1))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", fretscale.ModelWarning)
+        run(bodies(swing, line=True), contact((96, 1), method="full"))
+
+
+@pytest.mark.parametrize("line", [False, True], ids=["area", "line"])
+def test_a_tangential_force_above_friction_is_refused_by_its_code(line):
+    beyond = 1.001 * 0.6 * 50.0
+    loads = fretscale.LoadTable.legs({"P": (50.0, 50.0), "Qx": (beyond, -beyond)}, (1, 1))
+    with pytest.raises(fretscale.FretscaleError) as refused:
+        run(bodies(loads, line=line), contact((24, 1 if line else 24), method="full"))
+    assert error_kind(refused.value) is ErrorKind.NO_SOLUTION
+
+
+def test_a_contact_on_a_single_point_is_refused_by_its_code():
+    with pytest.raises(InputError) as refused:
+        run(bodies(STROKE), contact((4, 4)))
+    assert error_kind(refused.value) is ErrorKind.TOO_COARSE

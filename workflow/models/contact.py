@@ -31,6 +31,7 @@ from wear.steps.step_errors import ErrorControl, step_errors
 from wear.steps.steppers import ExplicitStepper, Stepper
 from wear.steps.stepping import WearingContact, WearState
 from wear.surfaces import Surfaces
+from workflow.errors import TooCoarse
 from workflow.messages.warning_kinds import Notice, WarningKind
 from workflow.models.checks.limits import MOST_CELLS, MOST_JUMPS, check_count
 from workflow.models.loads import ContactFace
@@ -377,14 +378,14 @@ def few_cells_warnings(
     """Yield the warnings for contacts that cover too few cells at peak load.
 
     ``pressures`` ``(nx, ny)`` [MPa] are those of each contact, unworn or ``worn``. Raises
-    InputError for an unworn contact that is a single point on its grid.
+    TooCoarse for an unworn contact that is a single point on its grid.
     """
     after = " after wear" if worn else ""
     for stage, pressure in zip(stages, pressures, strict=True):
         if not (across := too_few_across(pressure > 0.0, stage.grid.line)):
             continue
         if is_point(pressure > 0.0) and not worn:
-            raise InputError(
+            raise TooCoarse(
                 f"{stage.name}: the contact is only {' x '.join(map(str, across))} cells across, "
                 "so that its size and pressure are meaningless: give it a finer grid"
             )

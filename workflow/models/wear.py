@@ -17,6 +17,7 @@ from wear.coupled import CoupledWear
 from wear.coupled_state import CoupledState, Observer, check_observers, observed
 from wear.schedule import CoupledSettings
 from wear.steps.steppers import ROUNDING
+from wear.steps.stepping import ContactFailure
 from workflow.errors import warn_each
 from workflow.messages.warning_kinds import Notice
 from workflow.models.checks.limits import check_steps, unstable_fraction
@@ -56,6 +57,7 @@ from workflow.models.structure import StructureLoads
 from workflow.models.structure_model import StructureModel, StructureStore
 from workflow.models.uncoupled.body_pair import BodyPair
 from workflow.models.uncoupled.given_loads import GivenLoads
+from workflow.models.uncoupled.increments import CycleWork, increment_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -205,8 +207,8 @@ class WearModel:
         ModelWarning
             A contact touches the border of its grid, covers too few cells, yields, or is of
             dissimilar bodies whose coupling ``method`` "normal" neglects; explicit steps are
-            unstable; friction is unusual; the structure has an obvious fault, or its stress is not
-            fully known.
+            unstable; increments of two bodies are too long for ``method`` "full"; friction is
+            unusual; the structure has an obvious fault, or its stress is not fully known.
 
         Raises
         ------
@@ -235,6 +237,7 @@ class WearModel:
             check_steps(self.settings(loads), self.wear.fraction, state, first)
             warn_each(unstable_fraction(self.wear.fraction))
             warn_each(_warnings(loads, contacts, first))
+            warn_each(self._increment_warnings(contacts, unworn, first))
             end, found = loop.run(state), None
             warn_each(_end_warnings(contacts, first, end, recorder))
             if self.stress is not None:
@@ -269,6 +272,26 @@ class WearModel:
                 f"{self.wear.cycles:g}: give the model more"
             )
         return start, first
+
+    def _increment_warnings(
+        self,
+        contacts: FaceContacts,
+        unworn: Sequence[FaceLoads],
+        first: Sequence[FirstContact],
+    ) -> Sequence[Notice]:
+        """Return the warning for long increments of two bodies whose half-space finds the slip."""
+        if not isinstance(self.structure, BodyPair) or not first[0].cycle:
+            return ()
+        halved = replace(self, structure=self.structure.in_parts(2))
+        source = halved.loads()
+        (loads,), (finer,) = source.unworn(), halved.face_contacts(source).stages
+        try:
+            _, found = finer.contact.begin(loads, self.wear.cycles)
+        except ContactFailure:
+            return ()  # nothing is known of the error; the cycle itself has been solved
+        (stage,) = contacts.stages
+        given = CycleWork.of(stage.contact, unworn[0], first[0])
+        return increment_warnings(stage.name, given, CycleWork.of(finer.contact, loads, found))
 
     def _stress(
         self,

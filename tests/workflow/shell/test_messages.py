@@ -2,13 +2,17 @@
 
 import ast
 import json
+import pickle
 import re
 
+import fretscale
 import pytest
 
+from sa_solver.errors import ContactProblemError
 from tests.conftest import CASES
 from tests.source_trees import PACKAGES, modules
 from tests.workflow.command_line import command, invoke
+from wear.steps.stepping import ContactFailure
 from workflow.errors import CaseError, UserError
 from workflow.messages import error_kinds
 from workflow.messages.error_kinds import ErrorKind, error_kind
@@ -67,6 +71,41 @@ def test_a_general_error_has_the_kind_of_its_cause():
 
     assert raised(CaseError("no")) is ErrorKind.CASE_REFUSED
     assert raised(ValueError("no")) is raised(None) is ErrorKind.REFUSED
+
+
+def test_an_error_of_a_worker_has_the_kind_of_its_cause():
+    """Pickled, as between processes, an exception keeps its causes."""
+    try:
+        try:
+            raise ContactFailure("increment 1") from ContactProblemError("friction")
+        except ContactFailure as error:
+            raise ContactFailure("pad: increment 1") from error
+    except ContactFailure as error:
+        received = pickle.loads(pickle.dumps(error))
+    assert str(received) == "pad: increment 1"
+    assert error_kind(received) is ErrorKind.NO_SOLUTION
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        {"name": "sphere_normal", "load_path": {"legs": [{"P": "50 N"}, {"Qx": "31 N"}]}},
+        {
+            "name": "cylinder_wear",
+            "contact__method": "full",
+            "load_path": {"legs": [{"P": "50 N/mm", "Qx": "31 N/mm"}, {"Qx": "-31 N/mm"}]},
+            "wear__cycles": 100,
+        },
+    ],
+    ids=lambda case: case["name"],
+)
+def test_a_tangential_force_above_friction_is_refused_by_its_code(tmp_path, case):
+    name = case.pop("name")
+    grid = [16, 16] if name == "sphere_normal" else 32
+    changed = {"contact__grid": grid, "friction__coefficient": 0.6, "expect": [], **case}
+    with pytest.raises(fretscale.MethodFailed) as refused:
+        fretscale.run(CASES / f"{name}.yaml", tmp_path / "out", quiet=True, **changed)
+    assert error_kind(refused.value) is ErrorKind.NO_SOLUTION
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.code)

@@ -31,29 +31,30 @@ def run_contact(run: ContactRun) -> None:
     increments before it are written. Raises UserError where ``contact.history`` does not suit the
     path, or the contact is smaller than the cells.
     """
-    outcome, message = _march(run.case, run.folder, run.reporter)
+    outcome, ended = _march(run.case, run.folder, run.reporter)
     if outcome.history.states:
         _warn(outcome, run.reporter)
-    if message:
+    if ended is not None:
         kept = ""
         if outcome.history.states:
             write_contact_results(outcome, run)
             kept = f"; the increments so far are in {run.folder.results}"
-        raise MethodFailed(f"{message}{kept}")
+        raise MethodFailed(f"{ended}{kept}") from ended
     _check_grid(outcome, run.reporter)
     write_contact_output(outcome, run)
 
 
 def _march(
     case: BodiesCase, folder: OutputFolder, reporter: Reporter
-) -> tuple[ContactOutcome, str]:
-    """Return the outcome of the path, and a message on why it ended early; empty if it did not."""
+) -> tuple[ContactOutcome, MethodFailed | None]:
+    """Return the outcome of the path, and the error that ended it early, or None."""
     grid, table = case.contact.centred(), case.load_path.table()
     reporter.warn_each(surface_warnings(case.structure, grid))
     height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
     strain = table.bulk_strain(bodies_of(case))
     passed: dict[int, ContactState] = {}
     cost: list[int] = []
+    ended: MethodFailed | None = None
     with reporter.course("contact"), reporter.stage("contact"):
 
         def keep(row: int, state: ContactState, share: float) -> None:
@@ -82,13 +83,16 @@ def _march(
             raise UserError(f"{folder.case}: contact.history: {error}") from error
         except ContactProblemError as error:
             reached = max(passed, default=-1) + 1
-            message = f"after increment {reached} of {len(table)}: {error}"
+            ended = MethodFailed(f"after increment {reached} of {len(table)}: {error}")
+            ended.__cause__ = error
             history = History(list(passed.values()), list(passed), "full", "ended early")
         else:
             last, row = history.states[-1], history.indices[-1] + 1
-            message = f"increment {row} of {len(table)} did not converge: {last.message}"
-            message = "" if last.converged else message
-    return ContactOutcome(case, grid, height, table, strain, history, sum(cost)), message
+            if not last.converged:
+                ended = MethodFailed(
+                    f"increment {row} of {len(table)} did not converge: {last.message}"
+                )
+    return ContactOutcome(case, grid, height, table, strain, history, sum(cost)), ended
 
 
 def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:

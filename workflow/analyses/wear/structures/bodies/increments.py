@@ -1,10 +1,4 @@
-"""Increments of a cycle of two bodies with friction, and the error due to them.
-
-The loads of such a cycle vary linearly from increment to increment, so that values in between are
-known. A solution in twice as many increments measures their error, that of friction and that of
-sums over increments together: backward Euler is of first order, and halving the increments removes
-half of the error.
-"""
+"""Choice of the increments of a cycle of two bodies with friction, by the error due to them."""
 
 from __future__ import annotations
 
@@ -14,10 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from sa_solver.cycles.history import MOST_INCREMENTS, NO_ENERGY
-from sa_solver.cycles.increments import depth_and_energy
-from sa_solver.rigid_modes import PLANAR
-from sa_solver.types import Array
+from sa_solver.cycles.history import MOST_INCREMENTS
 from wear.contact.interface import InterfaceContact
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.contact.load_path import Leg, LineLeg
@@ -27,6 +18,7 @@ from workflow.analyses.wear.structures.bodies.model import source_of
 from workflow.analyses.wear.translation import face_contact
 from workflow.case.changing import changed
 from workflow.case.text.readable import percent
+from workflow.models.uncoupled.increments import CycleWork
 
 AnyCase = TypeVar("AnyCase", bound=TwoBodiesWearCase)
 
@@ -71,36 +63,19 @@ def _contact(case: TwoBodiesWearCase, parts: int) -> tuple[InterfaceContact, Any
     return face_contact(case, face).contact, loads
 
 
-def _cycle(case: TwoBodiesWearCase, parts: int) -> tuple[Array, float] | None:
-    """Return friction work per area and work of the shear loads of a cycle, or None if unsolved.
-
-    The second value sums the absolute work of all increments [N mm], per area of a cell.
-    """
+def _cycle(case: TwoBodiesWearCase, parts: int) -> CycleWork | None:
+    """Return the friction work of a cycle with its increments in ``parts``, or None if unsolved."""
     contact, loads = _contact(case, parts)
     try:
         _, first = contact.begin(loads, case.wear.cycles)
     except ContactFailure:
         return None
-    work = contact.unworn_tractions(loads, first).work.sum(axis=0)
-    planar = list(PLANAR)
-    forces, motions = (
-        np.array([getattr(state, name)[planar] for state in first.cycle])
-        for name in ("resultants", "rigid")
-    )
-    moved = np.abs(np.sum(forces * (motions - np.roll(motions, 1, axis=0)), axis=1)).sum()
-    return work, float(moved) / contact.grid.cell_area
+    return CycleWork.of(contact, loads, first)
 
 
-def _change(coarse: tuple[Array, float] | None, fine: tuple[Array, float] | None) -> float:
+def _change(coarse: CycleWork | None, fine: CycleWork | None) -> float:
     """Return the larger relative change of depth and energy; inf if a cycle is unknown."""
-    if coarse is None or fine is None:
-        return np.inf
-    (before, _), (work, moved) = coarse, fine
-    energy = float(work.sum())
-    if energy <= 0.0:
-        return 0.0 if before.sum() <= 0.0 else np.inf
-    scale = max(1.0, NO_ENERGY * moved / energy)
-    return float(np.max(depth_and_energy(work - before) / depth_and_energy(work)) / scale)
+    return np.inf if coarse is None or fine is None else coarse.change(fine)
 
 
 def _divided(case: TwoBodiesWearCase, parts: int) -> dict[str, Any]:
