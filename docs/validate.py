@@ -14,7 +14,6 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from math import floor, log10
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,8 +22,8 @@ import numpy as np
 from draw_gallery import ROOT, store
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from validation_codes import LEVEL_SETS, MESHES, abaqus, codes, llavori_figure
 from validation_results import (
-    DATA,
     JOULE,
     RUNS,
     Comparison,
@@ -33,9 +32,9 @@ from validation_results import (
     comparisons,
     measured_mccoll,
     measured_profiles,
+    number,
 )
 
-from sa_solver.types import Array
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, write_figures
 
@@ -45,8 +44,6 @@ HEIGHT = 5.2
 # --- table --------------------------------------------------------------------------------------
 
 HEADINGS = (*("test", "quantity", "measured", "computed", "kind", "deviation", "likely cause"),)
-# Digits of values without an error, and relative error below which an error is not shown.
-DIGITS, LEAST = 3, 1e-3
 
 
 def table(results: Mapping[Comparison, tuple[float, float | None]]) -> list[list[str]]:
@@ -73,36 +70,6 @@ def table(results: Mapping[Comparison, tuple[float, float | None]]) -> list[list
     return rows
 
 
-def number(value: float, around: float | None) -> str:
-    """Return a value with its scatter or its error, which has two digits."""
-    if around is None or around < LEAST * abs(value):
-        shown = f"{value:.{DIGITS}g}" if abs(value) < 10**DIGITS else f"{value:.0f}"
-        if around is None:
-            return shown
-        return f"{shown} (closed form)" if around == 0.0 else f"{shown} (error below 0.1 %)"
-    decimals = max(0, 1 - floor(log10(around)))
-    return f"{value:.{decimals}f} ± {around:.{decimals}f}"
-
-
-def codes(run: Finished) -> list[list[str]]:
-    """Return the table of depths in the middle of the flat beside those of Abaqus."""
-    cycles, places, depths = run.depths()
-    centre = [float(np.interp(0.0, places, depth)) for depth in depths]
-    rows = [["cycles", "computed [µm]", "level sets [µm]", "moving mesh [µm]"]]
-    for reached, level, mesh in abaqus():
-        value = float(np.interp(reached, cycles, centre))
-        rows.append([f"{reached:.0f}", number(value, value * run["interface.error.depth.total"])])
-        rows[-1] += [f"{level:.2f}", f"{mesh:.2f}"]
-    return rows
-
-
-def abaqus() -> Array:
-    """Return cycles and depths by level sets and on a moving mesh ``(n, 3)`` [µm]."""
-    return np.genfromtxt(
-        DATA / "mccoll_2004_abaqus.csv", delimiter=",", comments="#", skip_header=5
-    )
-
-
 # --- figures ------------------------------------------------------------------------------------
 
 COLOURS = {"calibrated": GREEN, "partly calibrated": BLUE, "predicted": ORANGE}
@@ -126,9 +93,9 @@ def mccoll_figure(run: Finished) -> Figure:
         title="After 18,000 cycles",
     )  # fmt: skip
     right.plot(cycles, centre, color=ORANGE, label="computed")
-    reached, level, mesh = abaqus().T
-    right.plot(reached, level, "o", color=BLUE, mfc="none", ms=11, label="Abaqus, level sets")
-    right.plot(reached, mesh, "x", color=PURPLE, ms=9, label="Abaqus, moving mesh")
+    reached, level, mesh, *_ = abaqus("mccoll_2004").T
+    right.plot(reached, level, **LEVEL_SETS)
+    right.plot(reached, mesh, **MESHES)
     (depth, around), *_ = measured_mccoll()
     right.errorbar(
         reached[-1],
@@ -281,11 +248,12 @@ def main(runs: Path, names: list[str]) -> None:
     results = compare(runs, comparisons())
     done = partial(finished, runs)
     write("validation", table(results))
-    write("validation_codes", codes(done("mccoll_2004")))
+    write("validation_codes", codes(done))
     figures = [
         ("validation", partial(overview_figure, results)),
         ("validation_mccoll", partial(mccoll_figure, done("mccoll_2004"))),
         ("validation_cruzado", partial(cruzado_figure, done("cruzado_2010"))),
+        ("validation_llavori", partial(llavori_figure, done("llavori_2026"))),
         ("validation_rig", partial(rig_figure, results)),
         ("validation_bolted", partial(bolted_figure, done("bolted_joint_test4"), results)),
     ]

@@ -9,6 +9,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import floor, log10
 from pathlib import Path
 from typing import Any, Literal
 
@@ -37,6 +38,10 @@ class Run:
 RUNS: Mapping[str, Run] = {
     "mccoll_2004": Run("validation/mccoll_2004"),
     "cruzado_2010": Run("validation/cruzado_2010"),
+    "cruzado_800m": Run("validation/cruzado_2010", ("wear.cycles=100000", "measured=[]")),
+    "cruzado_1600m": Run("validation/cruzado_2010", ("wear.cycles=200000", "measured=[]")),
+    "cruzado_2400m": Run("validation/cruzado_2010", ("wear.cycles=300000", "measured=[]")),
+    "llavori_2026": Run("validation/llavori_2026", ("output.paraview=false",)),
     "rig_bouc_wen": Run("rig_bouc_wen"),
     "rig_force_75N": Run("rig_force_75N"),
     "rig_force_53N": Run("rig_force_75N", ("excitation.force=53 N", "energies=[2800 J]")),
@@ -86,6 +91,20 @@ class Finished:
 
 Computed = Callable[[Finished], tuple[float, float | None]]
 """Function that returns a result of a run and its estimated error, None if that is unknown."""
+
+# Digits of values without an error, and relative error below which an error is not shown.
+DIGITS, LEAST = 3, 1e-3
+
+
+def number(value: float, around: float | None) -> str:
+    """Return a value with its scatter or its error, which has two digits."""
+    if around is None or around < LEAST * abs(value):
+        shown = f"{value:.{DIGITS}g}" if abs(value) < 10**DIGITS else f"{value:.0f}"
+        if around is None:
+            return shown
+        return f"{shown} (closed form)" if around == 0.0 else f"{shown} (error below 0.1 %)"
+    decimals = max(0, 1 - floor(log10(around)))
+    return f"{value:.{decimals}f} ± {around:.{decimals}f}"
 
 
 @dataclass(frozen=True)

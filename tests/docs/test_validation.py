@@ -11,7 +11,8 @@ from tests.workflow.command_line import command, runs_here
 ROOT = Path(__file__).parents[2]
 FIGURES = ROOT / "docs" / "figures"
 PAGE = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
-QUIET = "output.figures=false", "output.report=false", "error_budget=known"
+FAST = "output.figures=false", "output.report=false"
+QUIET = *FAST, "error_budget=known"
 # Fewer strips, increments and wear steps than the case has.
 COARSE = "contact.grid=128", "load_path.increments=8", "wear.tolerance=5 %"
 
@@ -60,6 +61,21 @@ def test_deviations_are_those_of_the_numbers(stored):
         # Numbers have three digits, the deviation two.
         rounding = 0.5 * (computed / measured + 1.0) + 0.05 * abs(deviation)
         assert deviation == pytest.approx(100.0 * (computed / measured - 1.0), abs=rounding)
+
+
+def test_rows_of_other_codes_are_those_of_a_run(tmp_path):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "path", [str(ROOT / "docs"), *sys.path])
+        import validation_codes
+        from validation_results import Finished
+    case = ROOT / "cases" / "validation" / "llavori_2026.yaml"
+    with runs_here():
+        done = command("run", case, "--out", tmp_path, overrides=[*FAST, "output.paraview=false"])
+    assert done.exit_code == 0, done.stderr
+    with (FIGURES / "validation_codes.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.reader(file) if row[0] in ("test", "Llavori 2026")]
+    assert rows[0] == list(validation_codes.HEADINGS)
+    assert rows[1:] == validation_codes.partial_slip(Finished(tmp_path))
 
 
 def check(validate, stored, name, tmp_path, coarse=()):
