@@ -136,21 +136,31 @@ def test_implausible_models_are_warned_of(changed, wear, warning):
 
 
 @pytest.mark.parametrize("last", [0.01, 0.0])
-def test_friction_that_falls_within_a_step_is_warned_of(last):
-    """The transient is over after a few of 100 cycles: one step has only the friction at its end.
-
-    While µ falls from 0.6 to 0.006, 1 N mm is dissipated; a cycle has 1.2 N mm at first.
-    """
+def test_friction_that_falls_within_a_cycle_is_warned_of(last):
+    """While µ falls from 0.6 to 0.6 times ``last``, 1 N mm is dissipated; a cycle begins at 1.2."""
     falling = CoulombFriction(0.6, EnergyTable((0.0, 1.0), (1.0, last)))
-    with pytest.warns(fretscale.ModelWarning, match="friction (changes|vanishes)"):
-        model(of=contact(grid=(16, 16), friction=falling, method="full")).run()
+    with pytest.warns(fretscale.ModelWarning, match="within the first cycle"):
+        model(of=contact(grid=(16, 16), friction=falling)).run()
 
 
-def test_friction_that_falls_slowly_is_not_warned_of():
-    falling = CoulombFriction(0.6, EnergyTable((0.0, 1e3), (1.0, 0.5)))
+@pytest.mark.parametrize("last", [0.5, 0.0])
+def test_friction_that_falls_within_a_jump_is_followed(last):
+    """With e' = µ(e) P s: e = (1 - exp(-k N)) / c until the table ends, and a straight line then.
+
+    The first 10 N mm of 100 cycles change friction; a cycle dissipates 1.2 N mm at first.
+    """
+    falling = CoulombFriction(0.6, EnergyTable((0.0, 10.0), (1.0, last)))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        model(of=contact(grid=(16, 16), friction=falling, method="full")).run()
+        worn = model(of=contact(grid=(16, 16), friction=falling)).run()["interface"]
+    slope, begun = (1.0 - last) / 10.0, 0.6 * 50.0 * 0.04
+    ends = -np.log(last) / (slope * begun) if last else np.inf
+    energy = (1.0 - np.exp(-slope * begun * min(ends, 100.0))) / slope
+    if last:
+        energy += last * begun * (100.0 - ends)
+    assert worn["energy"].values[-1] == pytest.approx(energy, rel=5e-3)
+    volume = worn["volume_1"].values[-1]
+    assert volume == pytest.approx(1e-8 * worn["energy"].values[-1], rel=1e-9)
 
 
 def test_a_plausible_model_is_not_warned_of():

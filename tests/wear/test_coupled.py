@@ -151,7 +151,7 @@ def test_a_source_receives_changing_friction() -> None:
             return super().worn(depths, friction)
 
     def friction(energy: float) -> float:
-        return FRICTION * (1.0 + energy)
+        return FRICTION / (1.0 + energy)
 
     contacts = [patch(friction=friction)] * 2
     source = Listening((LOAD, 0.5 * LOAD), FALL, contacts[0].grid)
@@ -160,7 +160,7 @@ def test_a_source_receives_changing_friction() -> None:
     )
     states = run(settings, source, contacts)
     energies = states[-1].kinetics[1:, :, 4]
-    np.testing.assert_allclose(reported, FRICTION * (1.0 + energies))
+    np.testing.assert_allclose(reported, FRICTION / (1.0 + energies))
 
 
 # --- observers ------------------------------------------------------------------------------------

@@ -374,6 +374,10 @@ class WearingContact:
         work: Array = share * self.friction * self.sliding.slip[increment] * pressure
         return work
 
+    def energy_per_cycle(self, state: WearState) -> float:
+        """Return the energy of a mean cycle at the last pressures of a state [N mm]."""
+        return float(self._work(state.starts)[1].sum()) * self.grid.cell_area
+
     def _work(self, starts: Starts) -> tuple[Array, Array]:
         """Return the energy per area of both surfaces in a mean cycle, at the given pressures."""
         work_1 = work_2 = np.zeros(self.grid.shape)

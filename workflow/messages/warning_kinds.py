@@ -393,10 +393,11 @@ class WarningKind(MessageKind):
     )
     FRICTION_CHANGES = (
         "FS-W309",
-        "Friction changes much within a wear step",
-        "A step has the friction at its end. Energy and wear of the cycles before it are computed "
-        "with a wrong coefficient, and the estimated errors do not show this.",
-        "Take shorter wear steps where friction changes.",
+        "Friction changes faster than the run follows",
+        "Cycles are not divided, and the loads of a structure are solved again only after a wear "
+        "jump. Energy and wear are computed with a wrong coefficient, and the estimated errors do "
+        "not show this.",
+        "Take shorter wear jumps where friction changes; let it change over more than one cycle.",
     )
 
     # --- vibration and time ---------------------------------------------------------------------

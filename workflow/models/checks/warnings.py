@@ -20,8 +20,8 @@ from workflow.models.checks.limits import USUAL_FRICTION
 from workflow.models.contact import FaceContact, WornFaces
 
 LARGEST_CHANGE = 0.5
-"""Largest relative change of friction within a wear jump. Where it falls to 0.5 within the first
-jump of a ball, the energy is too low by 0.4 %; where it falls to 0.01, by 44 %.
+"""Largest relative change of friction within a cycle, or within a wear jump under loads that were
+solved with friction at its beginning.
 """
 
 
@@ -41,32 +41,48 @@ def friction_warnings(stages: Sequence[FaceContact]) -> Iterator[Notice]:
 def friction_step_warnings(
     stages: Sequence[FaceContact], first: Sequence[FirstContact], state: CoupledState[Any]
 ) -> Iterator[Notice]:
-    """Yield the warnings for contacts whose friction changes too much within one wear jump.
+    """Yield the warnings for contacts whose friction changes faster than the run follows.
 
-    A step has the friction at its end: what the friction was within it is lost, and steps of twice
-    the length, which estimate the error, lose it too.
+    Wear jumps are divided where friction changes, down to single cycles. The loads of a structure
+    are solved again after a jump only.
     """
     for stage, found, energy in zip(stages, first, state.kinetics[:, :, -1].T, strict=True):
-        begun = float(found.energy.sum())
-        if state.cycles[-1] >= 1.0 and energy[-1] < 0.5 * begun:
+        cycle = _friction_change(stage, [0.0, float(found.energy.sum())])
+        jumps = _friction_change(stage, energy)
+        solved_after_jumps = not isinstance(stage.contact, InterfaceContact) or (
+            state.solutions > 1 and any(face.pressed.size for face in state.interfaces)
+        )
+        if cycle is not None:
+            _, before, after = cycle
             yield Notice(
                 WarningKind.FRICTION_CHANGES,
-                f"{stage.name}: the whole run dissipates {energy[-1]:.3g} N mm, its first cycle "
-                f"{begun:.3g}: friction vanishes within the first step; give smaller jumps",
+                f"{stage.name}: friction changes from {before:.3g} to {after:.3g} within the first "
+                "cycle, and cycles are not divided: energy and wear may be wrong; let friction "
+                "change over more energy",
             )
-            continue
-        friction = np.array([stage.settings.friction(float(e)) for e in energy])
-        largest = np.maximum(friction[1:], friction[:-1])
-        change = np.abs(np.diff(friction)) / np.where(largest > 0.0, largest, 1.0)
-        if change.max(initial=0.0) > LARGEST_CHANGE:
-            jump = int(np.argmax(change))
-            before, after = friction[jump : jump + 2]
+        elif jumps is not None and solved_after_jumps:
+            jump, before, after = jumps
             yield Notice(
                 WarningKind.FRICTION_CHANGES,
                 f"{stage.name}: friction changes from {before:.3g} to {after:.3g} within the wear "
-                f"jump to {state.cycles[jump + 1]:.3g} cycles, too fast for it: energy and wear "
-                "may be wrong; give smaller jumps",
+                f"jump to {state.cycles[jump + 1]:.3g} cycles, in which the loads stay those of "
+                "its beginning: energy and wear may be wrong; give smaller jumps",
             )
+
+
+def _friction_change(
+    stage: FaceContact, energy: Sequence[float]
+) -> tuple[int, float, float] | None:
+    """Return where friction changes most between energies, before and after; None if it is little.
+
+    The place is the number of the change, which counts by the largest friction.
+    """
+    friction = np.array([stage.settings.friction(float(e)) for e in energy])
+    change = np.abs(np.diff(friction))
+    if not change.max(initial=0.0) > LARGEST_CHANGE * friction.max():
+        return None
+    place = int(np.argmax(change))
+    return place, float(friction[place]), float(friction[place + 1])
 
 
 def open_warnings(name: str, carried: Array, peak: int) -> Iterator[Notice]:
