@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import Collection, QuadMesh
+from matplotlib.collections import Collection, QuadMesh, TriMesh
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
@@ -109,8 +109,8 @@ def _as_svg(figure: Figure) -> str:
 def _lay_out(figure: Figure) -> None:
     """Fix the layout of a figure, because saving it with a layout engine would draw it twice.
 
-    Dense artists are rasterised in vector graphics, which would otherwise be large and slow to
-    show.
+    Dense artists and shaded triangles are rasterised in vector graphics, which would otherwise be
+    large and slow to show.
     """
     for text in _words(figure):
         text.set_text(TIMES.sub(" × ", typeset(text.get_text())))
@@ -122,7 +122,7 @@ def _lay_out(figure: Figure) -> None:
         engine.execute(figure)
         figure.set_layout_engine(None)
     for artist in _artists(figure):
-        if isinstance(artist, Collection | Line2D) and _vertices(artist) > DENSE:
+        if isinstance(artist, Collection | Line2D) and _is_dense(artist):
             artist.set_rasterized(True)
 
 
@@ -151,6 +151,14 @@ def _names_in_legends(figure: Figure) -> Iterator[Text]:
     for artist in _artists(figure):
         if isinstance(artist, Legend):
             yield from artist.get_texts()
+
+
+def _is_dense(artist: Any) -> bool:
+    """Return whether vector graphics would draw a line or collection slowly.
+
+    Triangles with shaded colours always are, because SVG needs several gradients for each.
+    """
+    return isinstance(artist, TriMesh) or _vertices(artist) > DENSE
 
 
 def _vertices(artist: Any) -> int:
