@@ -247,30 +247,38 @@ class SupportedBody:
         displacement[inner] = solve(rhs)
         return self._all(displacement, amplitudes)
 
-    def respond(self, interface_forces: Array, amplitudes: Array) -> tuple[Array, Array]:
+    def respond(
+        self, interface_forces: Array, amplitudes: Array, forces: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return all displacements and those of the interface under interface forces.
 
-        ``interface_forces`` ``(d n, ...)`` and ``amplitudes`` ``(cases, ...)`` may have columns.
+        ``interface_forces`` ``(d n, ...)``, ``amplitudes`` ``(cases, ...)`` and further nodal
+        ``forces`` ``(d all, ...)`` may have columns.
         For a body that supports leave free, the result is its deformation alone; add
         :meth:`rigid_displacements` in the amounts that the contact determines.
         """
         stiffness, loads = self._reduced()
         rhs = loads @ amplitudes
-        forces = interface_forces[self._free]
-        rhs[self._interface] += forces if self._springs is None else self._springs.on_ends(forces)
+        if forces is not None:
+            rhs += self._transformation.T @ forces
+        on_faces = interface_forces[self._free]
+        if self._springs is not None:
+            rhs[self._interface] += self._springs.on_ends(on_faces)
+        else:
+            rhs[self._interface] += on_faces
         rigid = self._rigid
         if rigid.shape[1]:
             # Spread the unbalanced load that the contact solver leaves evenly over the body, so
             # that none of it acts on the displacements that are held for the solution.
             rhs -= rigid @ (rigid.T @ rhs)
-            free = np.delete(np.arange(len(rhs)), _independent(rigid))
+            free = np.delete(np.arange(len(rhs)), independent(rigid))
             displacement = np.zeros_like(rhs)
             displacement[free] = prepare(
                 stiffness[free][:, free].tocsr(), self._soft_motions[free]
             )(rhs[free])
         else:
             displacement = prepare(stiffness, self._soft_motions)(rhs)
-        return self._all(displacement, amplitudes), self._on_interface(displacement, forces)
+        return self._all(displacement, amplitudes), self._on_interface(displacement, on_faces)
 
     def rigid_displacements(self) -> tuple[Array, Array]:
         """Return the rigid motions that supports leave free.
@@ -450,7 +458,7 @@ def interface_nodes(faces: Sequence[tuple[Interface, int]], body: Body) -> tuple
     return np.concatenate(nodes), np.concatenate(frames)
 
 
-def _independent(motions: Array) -> Indices:
+def independent(motions: Array) -> Indices:
     """Return unknowns ``(k,)`` that, when held, prevent ``motions`` ``(n, k)`` in a stable way."""
     _, _, order = sl.qr(motions.T, mode="economic", pivoting=True)
     return np.asarray(order[: motions.shape[1]])

@@ -21,7 +21,7 @@ from skfem import (
 from skfem.helpers import grad
 
 from fe_models.meshes.isoparametric import INTEGRATED, facet_normals, mapping_of
-from fe_models.meshes.structure_mesh import Body, in_space
+from fe_models.meshes.structure_mesh import Body, in_space, mesh_edges
 from sa_solver.half_space.stress import principal_stresses
 from sa_solver.half_space.subsurface_influence import INDICES
 from sa_solver.types import Array, Indices, Material
@@ -168,6 +168,57 @@ class ElasticBody:
         size = traction(_spatial(np.asarray(basis.global_coordinates())))
         load = LinearForm(lambda v, w: w.f * v).assemble(basis, f=size)
         return np.outer(load, direction[list(self.body.axes)]).ravel()
+
+    def facet_rule(self, boundary: str, degree: int) -> tuple[Array, Array, sp.csr_matrix]:
+        """Return integration points of a boundary ``(3, p)`` [mm], their areas, and nodal weights.
+
+        The areas ``(p,)`` [mm²] integrate up to a ``degree``. The weights ``(nodes, p)`` [mm²] give
+        nodal forces from tractions at the points.
+        """
+        basis = self._facet_basis(boundary, degree=degree)
+        points = _spatial(np.asarray(basis.global_coordinates()))
+        areas = np.asarray(basis.dx)
+        places = np.arange(areas.size).reshape(areas.shape)
+        values, rows, columns = [], [], []
+        for nodes, (field,) in zip(basis.element_dofs, basis.basis, strict=True):
+            values.append((np.asarray(field) * areas).ravel())
+            rows.append(np.repeat(nodes, areas.shape[1]))
+            columns.append(places.ravel())
+        parts = (np.concatenate(part) for part in (values, rows, columns))
+        value, row, column = parts
+        shape = (len(self.nodes), areas.size)
+        weights = sp.csr_matrix((value, (row, column)), shape=shape)
+        return points.reshape(3, -1), areas.ravel(), weights
+
+    def nodal_density_load(self, density: Array) -> Array:
+        """Return forces ``(size,)`` of a force per volume, linear between the vertices.
+
+        ``density`` is ``(vertices, 3)`` [N/mm³].
+        """
+        linear = self._basis.with_element(ELEMENTS[self.dimension, 1]())
+        form = LinearForm(lambda v, w: w.f * v)
+        loads = [
+            form.assemble(self._basis, f=linear.interpolate(density[:, axis]))
+            for axis in self.body.axes
+        ]
+        return np.stack(loads, axis=1).ravel()
+
+    def nodal_density(self, loads: Array) -> Array:
+        """Return the force per volume ``(vertices, 3)`` [N/mm³] of nodal forces ``(size,)``.
+
+        It is the mean of the forces over the elements at each vertex, so that forces on a surface
+        are spread into the body. A constant force per volume is exact.
+        """
+        mesh = self.body.mesh
+        nodal = loads.reshape(-1, self.dimension)
+        forces = nodal[: mesh.nvertices].copy()
+        if self.order == 2:
+            # A linear function has half of its ends' values at a midside node.
+            for end in mesh_edges(mesh).T:
+                np.add.at(forces, end, 0.5 * nodal[mesh.nvertices :])
+        linear = self._basis.with_element(ELEMENTS[self.dimension, 1]())
+        volumes = LinearForm(lambda v, w: 1.0 * v).assemble(linear)
+        return np.array(in_space(forces / volumes[:, None]))
 
     def thermal_load(self, strain: Array) -> Array:
         """Return forces ``(size,)`` of an expansion ``(vertices,)``, linear between the vertices.

@@ -83,6 +83,19 @@ class StressRecovery:
             stress[t] = self._of_slopes(slope, expansion, vertices)
         return stress
 
+    def slopes(self, values: Array, vertices: Indices) -> Array:
+        """Return the derivatives ``(k, d, n)`` at ``vertices`` of nodal ``values`` ``(nodes, k)``.
+
+        They are those of the polynomials that give the stress.
+        """
+        points = self._elastic.nodes[:, list(self._elastic.body.axes)]
+        nodes = self._nodes_near(self._patches[vertices])
+        return _gradients(points, values, vertices, nodes, self._elastic.order + 1)
+
+    def along_surface(self, vertices: Indices) -> Array:
+        """Return the projectors ``(n, 3, 3)`` on the free surface at ``vertices``."""
+        return self._along_surface[vertices]
+
     def alternatives(
         self, displacement: Array, vertices: Indices, thermal: Array | None = None
     ) -> Array:

@@ -14,6 +14,7 @@ from fe_models.elasticity.body import (
     maximum_principal,
     tensors,
 )
+from fe_models.elasticity.local_model import LocalModel
 from fe_models.elasticity.recovery import StressRecovery
 from fe_models.elasticity.thermal import thermal_gradient
 from fe_models.meshes.structure_mesh import Body, in_space
@@ -84,6 +85,8 @@ class StressField:
     notch
         Largest stress on the free surface, which the mesh can resolve; contact pressure has steep
         edges. None if there is no free surface.
+    local
+        Local model that ``notch`` is from, if it is not from the vertices of the body.
     """
 
     body: Body
@@ -91,6 +94,7 @@ class StressField:
     stress: Array
     peak: PeakStress
     notch: PeakStress | None
+    local: LocalModel | None = None
 
     @cached_property
     def von_mises(self) -> Array:
@@ -101,6 +105,13 @@ class StressField:
     def maximum_principal(self) -> Array:
         """Largest principal stress ``(n,)`` [MPa]."""
         return maximum_principal(self.stress)
+
+    def with_notch(self, local: LocalModel) -> StressField:
+        """Return the field with the largest stress on the free surface from a local model."""
+        equivalent, principal = local.largest.tolist()
+        notch = PeakStress(equivalent, principal, local.place, at_contact=False, error=local.error)
+        largest = self.peak == self.notch or notch.von_mises > self.peak.von_mises
+        return replace(self, notch=notch, peak=notch if largest else self.peak, local=local)
 
     def at(self, points: Array, frame: Frame) -> Array:
         """Return stress ``(6, n)`` [MPa] along the axes of a ``frame`` at points ``(n, 3)`` in it.

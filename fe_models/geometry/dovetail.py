@@ -21,6 +21,7 @@ from fe_models.meshes.structure_mesh import (
     MeshError,
     StructureMesh,
     matched_interface,
+    mesh_edges,
     named_mesh,
 )
 from fe_models.readers.gmsh_file import EntityGroup, generated_body
@@ -38,6 +39,9 @@ SAMPLES = 200
 # order 1 the error of the stress there is 6 % (11 % with 24 elements); with 40 nodes and order 2 it
 # is 0.5 %.
 NOTCH = 48
+
+# Distance of a vertex from the circle of its fillet, relative to the radius, due to rounding.
+ON_ARC = 1e-7
 
 # Curves of a section that are not boundaries.
 UNNAMED = ("", "middle", "fillet")
@@ -242,6 +246,9 @@ class Dovetail:
         size: float,
         dimension: Literal[2, 3] = 3,
         notch: int = NOTCH,
+        *,
+        growth: float = SIZE_GROWTH,
+        curved: bool = False,
     ) -> StructureMesh:
         """Mesh both bodies: the disk is body 1, the blade body 2.
 
@@ -258,6 +265,10 @@ class Dovetail:
             3, or 2 for the section in the middle of the slot, which must not be skewed.
         notch
             Number of elements around a full circle of a fillet.
+        growth
+            Growth of the size of elements per distance from the flanks.
+        curved
+            Whether elements of second order follow the fillets; otherwise their sides are straight.
 
         Raises
         ------
@@ -279,16 +290,47 @@ class Dovetail:
         }
         disk, blade = (
             _mesh_body(
-                name, section, self, flank_nodes, (size, 2.0 * np.pi * fillet / notch), dimension
+                name,
+                section,
+                self,
+                flank_nodes,
+                (size, 2.0 * np.pi * fillet / notch),
+                growth,
+                dimension,
             )
             for name, (section, fillet) in sections.items()
         )
+        if curved:
+            disk, blade = (
+                self._curved(body, sections[name][0])
+                for name, body in (("disk", disk), ("blade", blade))
+            )
         interfaces = []
         for name, side in (("intrados", 1), ("extrados", -1)):
             face = matched_interface(name, disk, blade, name, self.flank_frame(side))
             x, y = face.coordinates.T
             interfaces.append(replace(face, gap=self.flank_gap(x, y, side)))
         return StructureMesh((disk, blade), tuple(interfaces))
+
+    def _curved(self, body: Body, section: list[SectionCurve]) -> Body:
+        """Return the body with midside nodes, those on its fillets at their true radius."""
+        edges, facets = mesh_edges(body.mesh), body.mesh.boundary_facets()
+        on_surface = np.zeros(len(edges), bool)
+        on_surface[facets if body.mesh.dim() == 2 else np.unique(body.mesh.f2e[:, facets])] = True
+        middles = body.points[edges].mean(axis=1)
+        # The section is the same in every plane Y = const, but shifted along X if it is skewed.
+        slope = np.tan(self.skew)
+        places = body.points[:, [0, 2]] - slope * body.points[:, 1:2] * [1.0, 0.0]
+        for start, middle, _ in (corners for name, corners in section if name == "fillet"):
+            for side in (1.0, -1.0):
+                centre = np.array(middle) * [side, 1.0]
+                radius = float(np.hypot(*np.subtract(start, middle)))
+                off = np.abs(np.linalg.norm(places - centre, axis=1) - radius)
+                round_edges = on_surface & (off < ON_ARC * radius)[edges].all(axis=1)
+                arms = places[edges[round_edges]].mean(axis=1) - centre
+                arms *= radius / np.linalg.norm(arms, axis=1, keepdims=True) - 1.0
+                middles[np.ix_(round_edges, [0, 2])] += arms
+        return replace(body, midsides=np.ascontiguousarray(middles[:, body.axes]))
 
     def blade_section(self) -> list[SectionCurve]:
         """Return named curves around the right half of the blade; arcs are (start, centre, end)."""
@@ -358,13 +400,14 @@ def _mesh_body(
     dovetail: Dovetail,
     flank_nodes: tuple[int, int],
     sizes: tuple[float, float],
+    growth: float,
     dimension: int,
 ) -> Body:
     """Mesh one body in a separate gmsh model.
 
-    ``sizes`` are the element sizes far away and on the fillets. Two bodies in one model would share
-    the nodes of their flanks, because gmsh identifies the nodes of an extruded mesh by their
-    position.
+    ``sizes`` are the element sizes far away and on the fillets, ``growth`` that from the flanks.
+    Two bodies in one model would share the nodes of their flanks, because gmsh identifies the nodes
+    of an extruded mesh by their position.
     """
     slot = dovetail.slot_length * dovetail.slot_direction if dimension == 3 else np.zeros(3)
     with gmsh_model(name) as gmsh:
@@ -374,7 +417,7 @@ def _mesh_body(
         for curve in named["flank"]:
             model.mesh.setTransfiniteCurve(curve, flank_nodes[0])
         fine = dovetail.flank_width / (flank_nodes[0] - 1)
-        sources = (named["flank"], fine, SIZE_GROWTH), (named["fillet"], sizes[1], FILLET_GROWTH)
+        sources = (named["flank"], fine, growth), (named["fillet"], sizes[1], FILLET_GROWTH)
         for distance in grow_from(gmsh, "CurvesList", sources, sizes[0]):
             model.mesh.field.setNumber(distance, "Sampling", SAMPLES)
         _mirror_mesh(model, surfaces, -0.5 * slot[0])

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fe_models.cyclic.cuts import Cyclic
+from fe_models.elasticity.local_model import LocalModel
 from fe_models.elasticity.relinearised import Softening
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import (
@@ -22,12 +23,14 @@ from fe_models.imported_structure import (
     imported_softening,
     imported_structure,
 )
+from fe_models.joints.face_traction import FaceTraction
 from fe_models.loads.applied_loads import Acceleration, AppliedLoad, Rotation
 from fe_models.loads.pretension import Bolt, Pretension, bolt_section
 from fe_models.meshes.curved_face import Surface
 from fe_models.meshes.cut_face import whole_face
 from fe_models.meshes.second_order import with_midsides
 from fe_models.meshes.structure_mesh import Face, Interface, StructureMesh
+from fe_models.notch_stress import notch_models
 from fe_models.structure import Structure
 from sa_solver import checks
 from sa_solver.errors import InputError
@@ -310,6 +313,21 @@ class MeshAssembly:
         if self.order == 2 or not cheap:
             return None
         return FinerMesh(replace(self, order=2, joined=None))
+
+    def notch_models(
+        self, tractions: Sequence[FaceTraction], amplitudes: Array
+    ) -> list[list[LocalModel | None]] | None:
+        """Return local models driven by the bodies of second order.
+
+        Bodies of many nodes in space and faces that do not meet node to node have none.
+        """
+        cheap = self._plain.interfaces[0].line or self._plain.node_count(1) <= MOST_NODES
+        matching = all(face.projection is None for face in self._plain.interfaces)
+        if not (cheap and matching):
+            return None
+        second = self if self.order == 2 else replace(self, order=2, joined=None)
+        structure = second.structure(second.meshed().weighted(2))
+        return notch_models(structure, tractions, amplitudes)
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
         """Return the unit of the mesh, bodies without mass, and contacts that are cut.

@@ -11,14 +11,17 @@ from typing import Literal
 import numpy as np
 
 from fe_models.dovetail import Mission, dovetail_softening, dovetail_structure
+from fe_models.elasticity.local_model import LocalModel
 from fe_models.elasticity.relinearised import Softening
 from fe_models.geometry.dovetail import Dovetail
+from fe_models.joints.face_traction import FaceTraction
 from fe_models.loads.pretension import Bolt
 from fe_models.meshes.structure_mesh import Interface, StructureMesh
+from fe_models.notch_stress import extruded_notch_models, notch_models
 from fe_models.structure import Structure
 from sa_solver import checks
 from sa_solver.errors import InputError
-from sa_solver.types import Material
+from sa_solver.types import Array, Material
 from workflow.messages.warning_kinds import WarningKind
 from workflow.models.budget.convergence import MESH_ORDER, share_of_difference
 from workflow.models.checks.warnings import weightless_warnings
@@ -32,6 +35,9 @@ SIDES = {"intrados": 1, "extrados": -1}
 # Increments up to the peak and after it in probe runs. Differences of probe runs hardly depend on
 # them.
 FEW_INCREMENTS = 4, 7
+# Section that drives local models of the notches: nodes across a flank, growth of the elements from
+# it, and elements round a full circle of a fillet.
+NOTCH_FLANK_NODES, NOTCH_GROWTH, NOTCH_ELEMENTS = 11, 0.35, 24
 # Least number of nodes across and along a flank.
 FEWEST_NODES = 3
 
@@ -254,6 +260,28 @@ class DovetailJoint:
         """
         share = 1.0 if self.order == 1 else share_of_difference(2.0, MESH_ORDER)
         return FinerMesh(replace(self, mesh=replace(self.mesh.refined(2.0), order=2)), share)
+
+    def notch_models(
+        self, tractions: Sequence[FaceTraction], amplitudes: Array
+    ) -> list[list[LocalModel | None]] | None:
+        """Return local models driven by the section with round fillets, extruded along the slot.
+
+        A skewed slot and cyclic sides in space have none.
+        """
+        geometry, cyclic = self.geometry, self.sides == "cyclic"
+        if self.dimension == 3 and (geometry.skew != 0.0 or cyclic):
+            return None
+        width, length = geometry.flank_width, geometry.slot_length
+        nodes = NOTCH_FLANK_NODES, FEWEST_NODES
+        mesh = geometry.mesh(nodes, width, 2, NOTCH_ELEMENTS, growth=NOTCH_GROWTH, curved=True)
+        mission = self.missions[self.heaviest]
+        section = dovetail_structure(geometry, mesh, self.disk, self.blade, mission, 2, cyclic)
+        if self.dimension == 2:
+            return notch_models(section, tractions, amplitudes)
+        # Elements along the slot are at most as long as the flank is wide, and even in number.
+        elements = 2 * int(np.ceil(0.5 * length / width))
+        ends = 0.5 * length * np.linspace(-1.0, 1.0, elements + 1)
+        return extruded_notch_models(section, tractions, amplitudes, ends)
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
         """Yield remarks: sides that a moment would move, and a joint that locks itself."""

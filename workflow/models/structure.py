@@ -133,7 +133,7 @@ class StructureLoads(ReportsProgress):
         kind = self.model.nonlinearity.stiffness
         if kind == "linear":
             return structure
-        amplitudes = self._peak_amplitudes
+        amplitudes = self.peak_amplitudes
         softening = self.model.softening(structure)
         how = {"stress_stiffened": stress_stiffened, "relinearised": relinearised}
         return how[kind](structure, self._linear_peak, amplitudes, softening)
@@ -141,7 +141,7 @@ class StructureLoads(ReportsProgress):
     @cached_property
     def _linear_peak(self) -> tuple[Array, ...]:
         """Displacements of all bodies of the linear structure at peak load."""
-        amplitudes = self._peak_amplitudes
+        amplitudes = self.peak_amplitudes
         linear = FrictionalJoint(self._linear_resolvent, self._nodal_friction())
         (state,) = map(_converged, linear.march(amplitudes[None], self._linear.gap()))
         return deformation(self._linear, state.force, state.displacement, amplitudes)
@@ -154,7 +154,7 @@ class StructureLoads(ReportsProgress):
             linear,
             self._linear_resolvent,
             self._nodal_friction(),
-            self._peak_amplitudes,
+            self.peak_amplitudes,
             linear.gap(),
             self.model.softening(linear),
         )
@@ -238,7 +238,7 @@ class StructureLoads(ReportsProgress):
         friction = self._nodal_friction()
         loads = [path.tolist() for path in (mission.preload, mission.amplitudes)]
         stiffness = self.model.nonlinearity.stiffness
-        at = None if stiffness == "linear" else self._peak_amplitudes.tolist()
+        at = None if stiffness == "linear" else self.peak_amplitudes.tolist()
         gaps = [interface.gap.tobytes() for interface in self.mesh.interfaces]
         key = *self.model.key, *loads, stiffness, at, self.friction, gaps
         return self._store.cycle(
@@ -340,7 +340,7 @@ class StructureLoads(ReportsProgress):
         self, depths: list[Array], guess: list[Array], friction: Sequence[float] | None
     ) -> FrictionState:
         joint = self._joint_of(self._nodal_friction(friction))
-        path = self._peak_amplitudes[None]
+        path = self.peak_amplitudes[None]
         (state,) = map(_converged, joint.march(path, self._gap(depths), guess=guess))
         return state
 
@@ -363,7 +363,7 @@ class StructureLoads(ReportsProgress):
         return np.concatenate([mission.amplitudes for mission in self.load_cycles])
 
     @property
-    def _peak_amplitudes(self) -> Array:
+    def peak_amplitudes(self) -> Array:
         """Amplitudes of the load cases at peak load ``(cases,)``."""
         peak: Array = self._amplitudes[self.peak]
         return peak

@@ -8,8 +8,10 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from fe_models.elasticity.local_model import LocalModel
 from fe_models.elasticity.relinearised import Softening
 from fe_models.joints.condensation import Condensed
+from fe_models.joints.face_traction import FaceTraction
 from fe_models.joints.joint import JointResolvent
 from fe_models.loads.pretension import Bolt
 from fe_models.meshes.structure_mesh import Interface, StructureMesh
@@ -143,6 +145,16 @@ class StructureModel(Protocol):
 
     def finer_mesh(self) -> FinerMesh | None:
         """Return the structure on a finer mesh for probe runs, or None without a cheap one."""
+        ...
+
+    def notch_models(
+        self, tractions: Sequence[FaceTraction], amplitudes: Array
+    ) -> list[list[LocalModel | None]] | None:
+        """Return local models of the notches by body and by state, or None if they are not cheap.
+
+        Contact ``tractions`` and ``amplitudes`` of the load cases ``(k, cases)`` are those of ``k``
+        states.
+        """
         ...
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterable[Remark]:

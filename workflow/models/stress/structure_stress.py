@@ -15,6 +15,7 @@ from sa_solver.transforms.threads import begun
 from sa_solver.types import Array
 from workflow.models.contact import WornFaces
 from workflow.models.stress.layout import MOMENTS
+from workflow.models.stress.notch_stress import with_local_models
 from workflow.models.structure import StructureLoads
 
 
@@ -43,8 +44,10 @@ class StressedStructure:
 
         For ``done`` see :func:`fe_models.elasticity.stress.cycle_stress`.
         """
-        states = {"unworn": (source.mesh, source.unworn_cycle), "worn": (mesh, cycle)}
-        return cls(source, mesh, cycle, source.stresses(states, shown, done))
+        cycles = {"unworn": source.unworn_cycle, "worn": cycle}
+        states = {"unworn": (source.mesh, cycles["unworn"]), "worn": (mesh, cycle)}
+        stresses = source.stresses(states, shown, done)
+        return cls(source, mesh, cycle, with_local_models(source, cycles, stresses))
 
     def under(
         self, moment: str, number: int

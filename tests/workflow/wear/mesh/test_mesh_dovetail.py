@@ -12,6 +12,7 @@ from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.analyses.wear.translation import structure_loads
 from workflow.kinds import load_case
+from workflow.models.stress.notch_stress import with_local_models
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 
@@ -38,13 +39,16 @@ def write_inp(path: Path, mesh) -> None:
     path.write_text("\n".join([*nodes, *cells, *surfaces, ""]), encoding="utf-8")
 
 
-def dovetail_as_mesh(folder, dovetail, ending):
+def dovetail_as_mesh(folder, dovetail, ending, *, curved=False):
     """Write the dovetail's mesh to a file, and the case that describes it.
 
-    Every increment is a separate leg, as the pull follows the square of the speed.
+    If it is ``curved``, its elements are of second order and follow the fillets. Every increment is
+    a separate leg, as the pull follows the square of the speed.
     """
     model = dovetail_joint(dovetail)
-    mesh = model.meshed()
+    mesh, own = model.meshed(), model.mesh
+    if curved:
+        mesh = model.geometry.mesh(own.flank_nodes, own.size, 3, own.notch, curved=True)
     file = folder / f"joint{ending}"
     (write_msh if ending == ".msh" else write_inp)(file, mesh)
     path, shape = dovetail.load_path, dovetail.structure
@@ -84,6 +88,30 @@ def dovetail_as_mesh(folder, dovetail, ending):
     legs = {"increments": [1] * len(speeds), "peak_leg": path.legs[0]}
     mu = dovetail.friction.coefficient
     return write_case(folder / "joint.yaml", structure, legs, mu, materials=materials)
+
+
+@pytest.mark.slow
+def test_local_models_of_a_mesh_agree_with_those_of_the_dovetail(tmp_path, small_path, monkeypatch):
+    """Tetrahedra of a file and extruded sections differ by no more than their estimated errors."""
+    monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
+    dovetail = load_case(small_path)
+    file = dovetail_as_mesh(tmp_path, dovetail, ".msh", curved=True)
+    stages = (
+        structure_loads(dovetail, dovetail_joint),
+        structure_loads(load_case(file), mesh_assembly),
+    )
+    fields = []
+    for stage in stages:
+        states = {"unworn": (stage.mesh, stage.unworn_cycle)}
+        stresses = stage.stresses(states)
+        local = with_local_models(stage, {"unworn": stage.unworn_cycle}, stresses)
+        fields.append(local["unworn"].fields)
+        for before, after in zip(stresses["unworn"].fields, fields[-1], strict=True):
+            assert after.local is not None
+            assert after.notch.error < before.notch.error
+    for ours, theirs in zip(*fields, strict=True):
+        apart = theirs.notch.von_mises / ours.notch.von_mises - 1.0
+        assert abs(apart) < ours.local.error + theirs.local.error
 
 
 @pytest.mark.slow

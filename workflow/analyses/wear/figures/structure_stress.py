@@ -1,4 +1,4 @@
-"""Figure of the structure's stress in a section through the contacts, and its change by wear."""
+"""Figures of the structure's stress: a section through the contacts, and the notches."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from matplotlib.tri import Triangulation
 from sa_solver.types import Array
 from workflow.analyses.wear.output.body_mesh import body_mesh
 from workflow.analyses.wear.output.layout import WearContents
+from workflow.case.text.readable import percent
 from workflow.models.stress.layout import MOMENTS
-from workflow.pictures.fields import scaled_panels
-from workflow.pictures.panels import course
+from workflow.pictures.fields import colour_bar, scaled_panels
+from workflow.pictures.panels import course, rounded
 from workflow.pictures.style import BLACK
 from workflow.shell.output.results import grid_of
 
@@ -27,6 +28,9 @@ CHANGE = "change by wear"
 BESIDE = 1e-7
 # Planes y = 0 of two faces are equal within this tolerance: mesh files have six digits.
 SAME_PLANE = 1e-5
+# Half of the width of a notch's view relative to the local model, and the ends of the view.
+NOTCH_VIEW, ENDS = 0.53, np.array([-1.0, 1.0])
+RING: dict[str, Any] = {"marker": "o", "markersize": 14, "mfc": "none", "color": BLACK}
 # Margin of the section around the faces, relative to their extent.
 SECTION_MARGIN = 0.4
 
@@ -71,6 +75,32 @@ def structure_stress(file: h5py.File, contents: WearContents) -> Figure:
     return figure
 
 
+def notch_stress(file: h5py.File, contents: WearContents) -> Figure:
+    """Draw the von Mises stress of the local models of all notches, with its largest place."""
+    shown = _shown_axes(file)
+    (along,) = {0, 1, 2} - set(shown)
+    state = contents.states[-1][0]
+    groups = {name: file["bodies"][name][state]["notch"] for name in contents.notches}
+    sections = [_cut(file, of, of["von_mises"][()], of.attrs["at"]) for of in groups.values()]
+    middles = [0.5 * (s.points.min(axis=0) + s.points.max(axis=0)) for s in sections]
+    half = NOTCH_VIEW * max(float(np.ptp(section.points, axis=0).max()) for section in sections)
+    top = max(float(section.stress.max()) for section in sections)
+    title = f"Von Mises stress in the notches at peak load, {state}"
+    figure, axes = scaled_panels(title, [1.0], len(sections))
+    panels = zip(axes.flat, groups.items(), sections, middles, strict=True)
+    for axis, (name, group), section, middle in panels:
+        at, largest = group.attrs["at"], rounded(float(group.attrs["largest"][0]))
+        colours = _draw_sections(axis, [section], top, signed=False)
+        axis.plot(*at[shown], **RING)
+        axis.set_title(f"{name}: {largest} MPa ± {percent(float(group.attrs['error']))}")
+        axis.set(xlim=middle[0] + half * ENDS, ylim=middle[1] + half * ENDS)
+        where = "" if contents.line else f", at {'XYZ'[along]} = {at[along]:.4g} mm"
+        axis.set_xlabel(f"global {'XYZ'[shown[0]]} [mm]{where}")
+    axes[0, 0].set_ylabel(f"global {'XYZ'[shown[1]]} [mm]")
+    colour_bar(figure, colours, list(axes.flat), "von Mises stress [MPa]")
+    return figure
+
+
 def _place(file: h5py.File, contents: WearContents) -> str:
     """Return the place of the section for the title."""
     if contents.line:
@@ -110,15 +140,21 @@ def _sections(file: h5py.File, state: str) -> list[_Section]:
     return [_cut(file, body["unworn"], change) for body, change in pairs]
 
 
-def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
-    """Return the section of a body and a nodal stress at y = 0; a plane body is shown whole."""
+def _cut(
+    file: h5py.File, body: h5py.Group, stress: Array, through: Array | None = None
+) -> _Section:
+    """Return the section of a body and a nodal stress at y = 0, or ``through`` a point ``(3,)``.
+
+    A plane body is shown whole.
+    """
     shown = _shown_axes(file)
     face = next(iter(file["grid"].values())).attrs
     mesh = body_mesh(body)
     mesh.point_data["stress"] = stress
     if body["elements"].shape[1] == 4:
         # The plane is off the middle, as a plane through nodes leaves holes between elements.
-        beside = face["origin"] + BESIDE * mesh.length * face["axes"][1]
+        origin = face["origin"] if through is None else through
+        beside = origin + BESIDE * mesh.length * face["axes"][1]
         cut = mesh.slice(normal=face["axes"][1], origin=beside).triangulate()
     else:
         cut = mesh.extract_surface(algorithm="dataset_surface")

@@ -17,7 +17,7 @@ from workflow.analyses.wear.figures.comparison import half_space_and_structure, 
 from workflow.analyses.wear.figures.error_budget import error_budget
 from workflow.analyses.wear.figures.loops import loops
 from workflow.analyses.wear.figures.resultants import resultants
-from workflow.analyses.wear.figures.structure_stress import structure_stress
+from workflow.analyses.wear.figures.structure_stress import notch_stress, structure_stress
 from workflow.analyses.wear.figures.subsurface import fretting_life, subsurface_stress
 from workflow.analyses.wear.output.layout import EXTRAPOLATION, WearContents
 from workflow.pictures.fields import (
@@ -79,6 +79,7 @@ def figures_of(contents: WearContents) -> Figures:
         "resultants": (resultants, True),
         "error_budget": (error_budget, True),
         "structure_stress": (structure_stress, contents.structure),
+        "notch_stress": (notch_stress, bool(contents.notches)),
         "half_space_and_structure": (half_space_and_structure, contents.comparison),
         "loops": (loops, contents.loops),
         "subsurface_stress": (subsurface_stress, contents.sections),

@@ -70,6 +70,15 @@ bolts/<bolt>
 bodies/<body>/error
     notch_stress | {_ERROR}
 bodies/<body>/<moment>{BODY}
+bodies/<body>/<moment>/notch
+    points | mm | notch_vertex axis | vertices of the local model of the notch
+    elements | 1 | notch_element corner | corner vertices of its tetrahedra, or triangles in the
+        plane
+    displacement | mm | notch_vertex axis | displacement at peak load
+    stress | MPa | stress_component notch_vertex | xx, yy, zz, xy, yz, zx of the global axes at
+        peak load
+    von_mises | MPa | notch_vertex | von Mises stress at peak load
+    maximum_principal | MPa | notch_vertex | largest principal stress at peak load
 bodies/<body>/<moment>/mission
     increments | 1 | increments | increments, counted from 1
     points | mm | surface_vertex axis | vertices of the surface, or of the whole body in the plane
@@ -110,8 +119,9 @@ class WearContents:
     ``mix`` of missions has the share of each. ``dissipation`` says whether the loads include
     dissipated energy. ``bolts`` are the names of the bolts that the loads tighten. A finite element
     ``structure`` has nodal tractions and all bodies unworn and worn, with a ``mission`` also over
-    the increments; ``nodes`` says that its nodes wear instead of half-spaces. ``coarse`` are the
-    interfaces with a solution on a coarse grid. The case may request a ``comparison`` of half-space
+    the increments; the bodies ``notches`` have local models. ``nodes`` says that its nodes wear
+    instead of half-spaces. ``coarse`` are the interfaces with a solution on a coarse grid. The case
+    may request a ``comparison`` of half-space
     and structure, tangential ``loops``, ``sections`` of the stress under the contacts, and maps of
     fretting ``life`` for the named interfaces; only the ``cracking`` ones are above 0 anywhere. The
     ``strained`` bodies have such stresses; a rigid body has none. ``worn`` says whether anything
@@ -125,6 +135,7 @@ class WearContents:
     mix: bool = False
     dissipation: bool = True
     structure: bool = False
+    notches: tuple[str, ...] = ()
     mission: bool = False
     nodes: bool = False
     bolts: tuple[str, ...] = ()

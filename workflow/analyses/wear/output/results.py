@@ -194,6 +194,7 @@ def _write_results(
             mix=outcome.interfaces[0].unworn.loads.mixed,
             dissipation=source.slip_known,
             structure=structure is not None,
+            notches=() if structure is None else structure.notches,
             mission=structure is not None and bool(structure.shown),
             nodes=nodes,
             bolts=() if structure is None else structure.bolts.names,

@@ -1,9 +1,10 @@
-"""The structure for ParaView: both bodies at peak load, and over the increments of a mission."""
+"""The structure for ParaView: bodies and notches at peak load, bodies over a mission."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -11,6 +12,9 @@ import numpy as np
 from workflow.analyses.wear.output.body_mesh import body_mesh
 from workflow.analyses.wear.output.layout import WearContents
 from workflow.pictures.vtk import CYCLES, INCREMENTS, Step, attach, write_series
+
+if TYPE_CHECKING:
+    import pyvista
 
 # Fields of a body, with units; its surface over the increments has no tensors.
 SURFACE = {"displacement": "mm", "von_mises": "MPa", "maximum_principal": "MPa"}
@@ -21,6 +25,9 @@ def write_structure(contents: WearContents, file: h5py.File, folder: Path) -> li
     """Write the series of both bodies at peak load, and those over the increments if present."""
     bodies = _bodies(contents, file, folder / "structure")
     written = write_series(folder / "structure.pvd", CYCLES, bodies)
+    if contents.notches:
+        notches = _notches(contents, file, folder / "notch")
+        written += write_series(folder / "notch.pvd", CYCLES, notches)
     for state, _ in contents.states if contents.mission else ():
         steps = _mission(file, state, folder / "mission")
         written += write_series(folder / f"mission_{state}.pvd", INCREMENTS, steps)
@@ -32,11 +39,25 @@ def _bodies(contents: WearContents, file: h5py.File, folder: Path) -> Iterator[S
     cycles = file["kinetics/cycles"][()]
     for (state, _), time in zip(contents.states, cycles[[0, -1]].tolist(), strict=False):
         for body, states in file["bodies"].items():
-            mesh, group = body_mesh(states[state]), states[state]
-            fields = {name: (np.atleast_1d(group[name][()]), unit) for name, unit in NODAL.items()}
-            tensor, unit = fields["stress"]
-            attach(mesh.point_data, fields | {"stress": (tensor.T, unit)})
+            yield time, body, folder / f"{body}_{state}.vtu", _stressed(states[state])
+
+
+def _notches(contents: WearContents, file: h5py.File, folder: Path) -> Iterator[Step]:
+    """Yield the local models of the notches at peak load, unworn and worn."""
+    cycles = file["kinetics/cycles"][()]
+    for (state, _), time in zip(contents.states, cycles[[0, -1]].tolist(), strict=False):
+        for body in contents.notches:
+            mesh = _stressed(file["bodies"][body][state]["notch"])
             yield time, body, folder / f"{body}_{state}.vtu", mesh
+
+
+def _stressed(group: h5py.Group) -> pyvista.UnstructuredGrid:
+    """Return a body with its displacements and stresses."""
+    mesh = body_mesh(group)
+    fields = {name: (np.atleast_1d(group[name][()]), unit) for name, unit in NODAL.items()}
+    tensor, unit = fields["stress"]
+    attach(mesh.point_data, fields | {"stress": (tensor.T, unit)})
+    return mesh
 
 
 def _mission(file: h5py.File, state: str, folder: Path) -> Iterator[Step]:

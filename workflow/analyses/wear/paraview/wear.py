@@ -12,6 +12,7 @@ The folder has these files:
   worn (``section/<interface>_<state>_<body>.vtu``);
 - ``structure.pvd``: all bodies at peak load, unworn at 0 and worn at the last computed number of
   cycles (``structure/<body>_<state>.vtu``); Warp By Vector on ``displacement`` deforms them;
+- ``notch.pvd``: the local models of the notches of bodies, in the same way;
 - ``mission_unworn.pvd`` and ``mission_worn.pvd``: their surfaces over the increments of the load;
 - ``flank_<interface>_<body>.stl``: the worn surfaces at true scale in global coordinates, except
   for line contacts.

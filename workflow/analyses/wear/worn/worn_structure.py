@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.elasticity.body import maximum_principal
+from fe_models.elasticity.local_model import LocalModel
 from fe_models.elasticity.nonlinear import NonlinearCheck
 from fe_models.elasticity.stress import PeakStress, StressField, SurfaceHistory, steps
 from fe_models.meshes.quality import element_sizes, elements_across, radius_ratios
@@ -66,6 +67,12 @@ class WornStructure:
         """The loads of the structure."""
         return self.stressed.source
 
+    @property
+    def notches(self) -> tuple[str, ...]:
+        """Names of the bodies with a local model of their notch."""
+        fields = self.stressed.stresses["worn"].fields
+        return tuple(field.body.name for field in fields if field.local is not None)
+
     @cached_property
     def bolts(self) -> BoltTensions:
         """Tensions of the bolts, unworn and worn."""
@@ -82,6 +89,10 @@ class WornStructure:
             stress = self.stressed.stresses[moment]
             for body, field in zip(mesh.bodies, stress.fields, strict=True):
                 writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
+                if (local := field.local) is not None:
+                    place = f"bodies/{body.name}/{moment}/notch"
+                    found = {"at": local.place, "largest": local.largest, "error": local.error}
+                    writer.put(place, _body(local.body, local), **found)
             for body, surface in zip(mesh.bodies, stress.surfaces, strict=bool(self.shown)):
                 mission = _mission(body, surface, self.shown)
                 writer.put(f"bodies/{body.name}/{moment}/mission", mission)
@@ -112,7 +123,7 @@ class WornStructure:
                     body.name: {
                         **_peak(field.peak),
                         "at_contact": field.peak.at_contact,
-                        "notch": None if field.notch is None else _peak(field.notch),
+                        "notch": _notch(field),
                     }
                     for body, field in zip(bodies, stress.fields, strict=True)
                 }
@@ -127,12 +138,11 @@ class WornStructure:
             notches = [field.notch for field in fields if field.notch is not None]
             worst = max(notches, key=lambda notch: notch.error, default=None)
             if worst is not None and worst.error > accuracy:
-                x, y, z = worst.place
                 kind, why = self._why(worst, accuracy)
                 reporter.warn(
                     kind,
                     f"{body.name}: the largest stress on the free surface, {worst.von_mises:.0f} "
-                    f"MPa at X {x:.4g}, Y {y:.4g}, Z {z:.4g} mm, {why}",
+                    f"MPa at {_place(worst)}, {why}",
                 )
 
     @property
@@ -175,6 +185,8 @@ class WornStructure:
             if unworn.notch is not None and worn.notch is not None:
                 error = _known([unworn.notch, worn.notch])
                 left = "no limit" if error is None else f"error due to the mesh {percent(error)}"
+                if worn.local is not None:
+                    left = f"local model at {_place(worn.notch)}, {left}"
                 parts.append(f"{_change(unworn.notch, worn.notch)} on the free surface ({left})")
             if worn.peak != worn.notch:
                 where = "on a contact face" if worn.peak.at_contact else "elsewhere"
@@ -215,6 +227,11 @@ def _known(peaks: Sequence[PeakStress]) -> float | None:
     return max(peak.error for peak in peaks) if all(p.bounded for p in peaks) else None
 
 
+def _place(peak: PeakStress) -> str:
+    x, y, z = peak.place
+    return f"X {x:.4g}, Y {y:.4g}, Z {z:.4g} mm"
+
+
 def _change(unworn: PeakStress, worn: PeakStress) -> str:
     return f"{unworn.von_mises:.0f} -> {worn.von_mises:.0f} MPa"
 
@@ -229,8 +246,19 @@ def _peak(peak: PeakStress) -> dict[str, Any]:
     }
 
 
-def _body(body: Body, field: StressField) -> Arrays:
-    """Return a body's mesh and stress."""
+def _notch(field: StressField) -> dict[str, Any] | None:
+    """Return the summary of the largest stress on the free surface, if there is any."""
+    if field.notch is None:
+        return None
+    if field.local is None:
+        return _peak(field.notch)
+    names = "size_error", "cut_error", "traction_error"
+    parts = {name: getattr(field.local, name) for name in names}
+    return _peak(field.notch) | {"local_model": parts}
+
+
+def _body(body: Body, field: StressField | LocalModel) -> Arrays:
+    """Return the mesh and stress of a body or of a local model."""
     fields = ("displacement", "stress", "von_mises", "maximum_principal")
     return {
         "points": body.points,
