@@ -204,7 +204,9 @@ def test_a_run_that_is_killed_at_random_loses_no_stored_step(kind, tmp_path):
             break
         kept, command = kept_in(out), ["resume", out]
     else:
+        # The last kill may come after the results, when nothing is left to resume.
+        ended = (out / "summary.json").exists()
         run_here(command)
-        assert counted(out)[1] == kept
+        assert ended or counted(out)[1] == kept
     assert results_of(out) == results_of(whole)
     assert not list(out.rglob("*.part.*"))
