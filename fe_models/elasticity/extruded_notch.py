@@ -18,12 +18,13 @@ from fe_models.elasticity.local_model import (
     FAR,
     NEAR,
     LocalModel,
+    at_largest,
     largest_of,
     marked,
     refined_patch,
 )
 from fe_models.elasticity.recovery import StressRecovery
-from fe_models.meshes.patch import CUT, MeshPatch
+from fe_models.meshes.patch import CUT
 from fe_models.meshes.structure_mesh import Body, MeshError
 from fe_models.solvers.linear_solver import SolverError, prepare
 from sa_solver.half_space.stress import von_mises
@@ -131,7 +132,7 @@ def _cut_out(
     rhs = load - local.stiffness @ solution
     solution[free] = prepare(local.stiffness[free][:, free].tocsr())(rhs[free])
     recovery = StressRecovery(section, marked(section))
-    inner = recovery.untouched[_inner(patch, whole.section, vertex)[recovery.untouched]]
+    inner = recovery.untouched[at_largest(patch, whole.section, vertex)[recovery.untouched]]
     shape = _prisms(section.body, local.levels)
     return [_largest(local, moved, recovery, inner, shape) for moved in solution.T]
 
@@ -157,14 +158,6 @@ def _largest(
         cut_error=0.0,
         traction_error=0.0,
     )
-
-
-def _inner(patch: MeshPatch, section: ElasticBody, vertex: int) -> np.ndarray:
-    """Return flags of the patch's vertices inside the section's elements at a vertex."""
-    mesh = section.body.mesh
-    at_vertex = np.zeros(mesh.nvertices)
-    at_vertex[mesh.t[:, (mesh.t == vertex).any(axis=0)]] = 1.0
-    return np.isclose(patch.of_vertices @ at_vertex, 1.0)
 
 
 def _prisms(section: Body, levels: Array) -> Body:

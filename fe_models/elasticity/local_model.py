@@ -209,6 +209,15 @@ def marked(local: ElasticBody) -> Indices:
     return np.asarray(local.body.mesh.boundaries[FREE])
 
 
+def at_largest(patch: MeshPatch, elastic: ElasticBody, vertex: int) -> np.ndarray:
+    """Return flags of the vertices of a patch at which the largest stress may be.
+
+    The largest one of the body is at its ``vertex``; the true place is in the elements there.
+    """
+    corners = elastic.body.mesh.t
+    return patch.inside(corners[:, (corners == vertex).any(axis=0)])
+
+
 def _is_round(notched: NotchedBody, vertex: int) -> bool:
     """Return whether elements follow the free surface: they are curved, or it is flat there.
 
@@ -228,7 +237,6 @@ def _cut_out(
 ) -> list[LocalModel] | None:
     """Return local models without errors, in some states, or None where loads act on them."""
     elastic = notched.elastic
-    mesh = elastic.body.mesh
     patch = refined_patch(elastic, notched.free, notched.contacts, vertex, rings)
     if patch is None:
         return None
@@ -238,10 +246,7 @@ def _cut_out(
     recovery = StressRecovery(local, marked(local))
     vertices = np.arange(local.body.mesh.nvertices)
     stresses = recovery.histories(displacement, vertices, thermal)
-    # The body's largest stress is at the vertex; its true place is in the elements there.
-    at_vertex = np.zeros(mesh.nvertices)
-    at_vertex[mesh.t[:, (mesh.t == vertex).any(axis=0)]] = 1.0
-    inner = np.isclose(patch.of_vertices @ at_vertex, 1.0)
+    inner = at_largest(patch, elastic, vertex)
     return [
         _largest(local, displacement[:, k], stress, recovery.untouched, inner)
         for k, stress in enumerate(stresses)

@@ -72,9 +72,9 @@ class FaceTraction:
         areas = interface.nodal_areas
         nodal = np.divide(forces, areas, out=np.zeros_like(forces), where=areas > 0.0)
         terms = _terms(interface, *interface.coordinates.T)
-        missing = forces @ terms.T - nodal @ (products @ terms.T)
-        gram = terms @ (products @ terms.T)
-        return cls(interface, nodal + np.linalg.solve(gram, missing[..., None])[..., 0] @ terms)
+        weights = products @ terms.T
+        missing = forces @ terms.T - nodal @ weights
+        return cls(interface, nodal + _linear(missing, terms @ weights) @ terms)
 
     def smoothed(self, axis: int) -> FaceTraction:
         """Return the traction smoothed along an ``axis`` of the frame, 0 or 1.
@@ -97,8 +97,8 @@ class FaceTraction:
         products = _products(interface)
         areas = np.asarray(products.sum(axis=0)).ravel()
         change = -np.stack([(stiffness @ of.T).T / areas for of in self.nodal])
-        gram = terms @ (products @ terms.T)
-        shares = np.linalg.solve(gram, (change @ (products @ terms.T))[..., None])[..., 0]
+        weights = products @ terms.T
+        shares = _linear(change @ weights, terms @ weights)
         return FaceTraction(interface, self.nodal + change - shares @ terms)
 
     def with_smoothed(self) -> FaceTraction:
@@ -163,8 +163,7 @@ class FaceTraction:
             at_nodes = _terms(self.interface, *self.interface.coordinates.T)
             exact = self.nodal @ (_products(self.interface) @ at_nodes.T)
             missing = exact - (traction * areas) @ terms.T
-            gram = (terms * areas) @ terms.T
-            traction = traction + np.linalg.solve(gram, missing[..., None])[..., 0] @ terms
+            traction = traction + _linear(missing, (terms * areas) @ terms.T) @ terms
         sign = 1.0 if number == 2 else -1.0
         return np.asarray(sign * np.einsum("ab,map->mbp", frame.axes, traction))
 
@@ -172,6 +171,14 @@ class FaceTraction:
 def _terms(interface: Interface, x: Array, y: Array) -> Array:
     """Return the linear functions 1, x and y ``(3, p)``; a line contact has no y."""
     return np.array([np.ones_like(x), x] if interface.line else [np.ones_like(x), x, y])
+
+
+def _linear(moments: Array, products: Array) -> Array:
+    """Return the factors of the terms whose sum has these ``moments`` ``(..., 3)``.
+
+    ``products`` are the integrals of products of the terms.
+    """
+    return np.asarray(np.linalg.solve(products, moments[..., None])[..., 0])
 
 
 def _products(interface: Interface) -> sp.csc_matrix:

@@ -34,6 +34,19 @@ RANK = 1e-6
 INSIDE = 1e-9
 
 
+def edge_numbers(edges: Indices, wanted: Indices) -> Indices:
+    """Return the rows of ``wanted`` edges ``(m, 2)`` among ``edges`` ``(k, 2)``, -1 for others.
+
+    The ends of an edge may be in any order. Of equal edges the first one counts.
+    """
+    count = 1 + max(edges.max(initial=0), wanted.max(initial=0))
+    known, asked = (np.sort(e, axis=1).astype(np.int64) @ (count, 1) for e in (edges, wanted))
+    order = np.argsort(known, kind="stable")
+    place = np.searchsorted(known[order], asked)
+    numbers = np.append(order, -1)[place]
+    return np.where(np.append(known, -1)[numbers] == asked, numbers, -1)
+
+
 @dataclass(frozen=True)
 class Midsides:
     """Midside points of edges, whose ends are the vertices ``edges`` ``(k, 2)``.
@@ -48,14 +61,9 @@ class Midsides:
 
     def at(self, edges: Indices) -> Array:
         """Return the points of ``edges`` ``(m, 2)``, ``(m, 3)`` [mm]; NaN where there is none."""
-        count = 1 + max(self.edges.max(initial=0), edges.max(initial=0))
-        known, wanted = (np.sort(e, axis=1) @ (count, 1) for e in (self.edges, edges))
-        order = np.argsort(known, kind="stable")
-        place = np.searchsorted(known[order], wanted)
+        numbers = edge_numbers(self.edges, edges)
         found = np.full((len(edges), 3), np.nan)
-        there = place < len(known)
-        there[there] = known[order[place[there]]] == wanted[there]
-        found[there] = self.points[order[place[there]]]
+        found[numbers >= 0] = self.points[numbers[numbers >= 0]]
         return found
 
 

@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 import scipy.sparse as sp
 
+from fe_models.meshes.curved_face import edge_numbers
 from fe_models.meshes.isoparametric import folded
 from fe_models.meshes.structure_mesh import (
     Body,
@@ -80,7 +81,7 @@ class MeshPatch:
         }
         cells = np.searchsorted(kept, mesh.t[:, chosen]).T
         part = named_mesh(mesh.p.T[kept], cells, corners)
-        edges = _numbers(mesh_edges(mesh), kept[mesh_edges(part)], mesh.nvertices)
+        edges = edge_numbers(mesh_edges(mesh), kept[mesh_edges(part)])
         nodes = np.append(kept, mesh.nvertices + edges)
         midsides = None if body.midsides is None else body.midsides[edges]
         return cls(
@@ -88,6 +89,12 @@ class MeshPatch:
             _selection(nodes, mesh.nvertices + len(mesh_edges(mesh))),
             _selection(kept, mesh.nvertices),
         )
+
+    def inside(self, elements: Indices) -> np.ndarray:
+        """Return flags ``(vertices,)`` of vertices in ``elements``, given by their corners."""
+        within = np.zeros(self.of_vertices.shape[1])
+        within[elements] = 1.0
+        return np.isclose(self.of_vertices @ within, 1.0)
 
     def refined(self) -> MeshPatch:
         """Return the patch with elements of half the size, on the same curved surface.
@@ -124,8 +131,7 @@ class MeshPatch:
         mesh, edges = self.body.mesh, mesh_edges(self.body.mesh)
 
         def middle(one: int, two: int) -> Indices:
-            ends = facets[:, [one, two]]
-            return mesh.nvertices + _numbers(edges, ends, mesh.nvertices)
+            return mesh.nvertices + edge_numbers(edges, facets[:, [one, two]])
 
         if facets.shape[1] == 2:
             half = middle(0, 1)
@@ -159,18 +165,10 @@ class MeshPatch:
             for k in range(corners):
                 found.append((these, vertices[:, k], weights[:, k] * (2.0 * weights[:, k] - 1.0)))
             for k, other in combinations(range(corners), 2):
-                number = count + _numbers(edges, vertices[:, [k, other]], count)
+                number = count + edge_numbers(edges, vertices[:, [k, other]])
                 found.append((these, number, 4.0 * weights[:, k] * weights[:, other]))
         row, column, value = (np.concatenate(part) for part in zip(*found, strict=True))
         return sp.csr_matrix((value, (row, column)), shape=(len(places), count + len(edges)))
-
-
-def _numbers(edges: Indices, wanted: Indices, count: int) -> Indices:
-    """Return the numbers of ``wanted`` edges ``(m, 2)`` among all ``edges``."""
-    key = np.array([count, 1])
-    known, asked = (np.sort(pairs, axis=1).astype(np.int64) @ key for pairs in (edges, wanted))
-    order = np.argsort(known, kind="stable")
-    return order[np.searchsorted(known[order], asked)]
 
 
 def _selection(chosen: Indices, count: int) -> sp.csr_matrix:
