@@ -26,7 +26,7 @@ from fe_models.meshes.structure_mesh import (
     numbered_as,
 )
 from fe_models.solvers.linear_solver import prepare
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 # An element that keeps less than this share of its volume is too flat for its stress to be trusted.
 SMALLEST_VOLUME_SHARE = 0.1
@@ -139,6 +139,17 @@ def element_volumes(mesh: MeshTet | MeshTri) -> Array:
     corners = mesh.p[:, mesh.t]
     edges = np.moveaxis(corners[:, 1:] - corners[:, :1], -1, 0)
     return np.linalg.det(edges) / factorial(mesh.dim())
+
+
+def oriented_elements(mesh: MeshTet | MeshTri) -> Indices:
+    """Return the corners of the elements ``(m, dim + 1)``, ordered to have positive volumes.
+
+    Files for VTK need that order; scikit-fem takes corners in any order.
+    """
+    elements = mesh.t.T.copy()
+    inverted = element_volumes(mesh) < 0.0
+    elements[inverted, -2:] = elements[inverted][:, [-1, -2]]
+    return elements
 
 
 def _unmeshed_gap(mesh: StructureMesh, interface: Interface) -> Array:

@@ -4,10 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from skfem import MeshTri
+from skfem import MeshTet, MeshTri
 
 from fe_models.joints.mortar import mortar_interface
-from fe_models.meshes.remesh import element_volumes, form_of, formed_mesh, worn_mesh, worn_volume
+from fe_models.meshes.remesh import (
+    element_volumes,
+    form_of,
+    formed_mesh,
+    oriented_elements,
+    worn_mesh,
+    worn_volume,
+)
 from fe_models.meshes.structure_mesh import Body, MeshError, StructureMesh
 from sa_solver.types import Frame
 
@@ -197,3 +204,13 @@ def test_form_that_crushes_elements_is_refused(coarse_mesh):
     mesh = replace(coarse_mesh, interfaces=tuple(faces))
     with pytest.raises(MeshError, match="elements of the blade"):
         formed_mesh(mesh, form_of(mesh))
+
+
+@pytest.mark.parametrize("kind", [MeshTet, MeshTri])
+def test_elements_in_files_have_positive_volumes(kind):
+    mesh = kind().refined(2)
+    volumes, elements = element_volumes(mesh), oriented_elements(mesh)
+    assert (volumes < 0.0).any()
+    oriented = element_volumes(kind(mesh.p, elements.T, sort_t=False))
+    np.testing.assert_allclose(oriented, np.abs(volumes))
+    np.testing.assert_array_equal(np.sort(elements, axis=1).T, np.sort(mesh.t, axis=0))

@@ -14,7 +14,7 @@ from fe_models.elasticity.local_model import LocalModel
 from fe_models.elasticity.nonlinear import NonlinearCheck
 from fe_models.elasticity.stress import PeakStress, StressField, SurfaceHistory, steps
 from fe_models.meshes.quality import element_sizes, elements_across, radius_ratios
-from fe_models.meshes.remesh import worn_volume
+from fe_models.meshes.remesh import oriented_elements, worn_volume
 from fe_models.meshes.structure_mesh import Body, Interface, StructureMesh, write_msh
 from sa_solver.half_space.stress import von_mises
 from sa_solver.types import LoadHistory, Tally
@@ -262,7 +262,7 @@ def _body(body: Body, field: StressField | LocalModel) -> Arrays:
     fields = ("displacement", "stress", "von_mises", "maximum_principal")
     return {
         "points": body.points,
-        "elements": body.mesh.t.T,
+        "elements": oriented_elements(body.mesh),
         **{name: getattr(field, name) for name in fields},
     }
 
