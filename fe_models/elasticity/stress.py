@@ -20,6 +20,7 @@ from fe_models.elasticity.thermal import thermal_gradient
 from fe_models.meshes.structure_mesh import Body, in_space
 from fe_models.motion import structure_motion
 from fe_models.structure import Structure
+from fe_models.supported_body import SupportedBody
 from sa_solver.half_space.stress import von_mises
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices
@@ -35,7 +36,7 @@ MISSING = {1: 1.4, 2: 0.75}
 
 
 def steps(bodies: int) -> int:
-    """Return the number of steps of :func:`cycle_stress`: the motion, and one for each body."""
+    """Return the number of steps of :func:`cycle_stresses`: the motion, and one for each body."""
     return bodies + 1
 
 
@@ -168,24 +169,27 @@ class CycleStress:
     expansions: tuple[tuple[Array, Array], ...] | None = None
 
 
-def cycle_stress(
+def cycle_stresses(
     structure: Structure,
-    force: Array,
-    relative: Array,
+    cycles: Sequence[tuple[Array, Array]],
     amplitudes: Array,
     at: int,
     shown: Sequence[int] = (),
     done: Callable[[], None] = lambda: None,
-) -> CycleStress:
-    """Return the stress in increment ``at`` and surfaces in others; motions of faces in all.
+) -> list[CycleStress]:
+    """Return the stress of every cycle in increment ``at``, surfaces in others, and face motions.
+
+    The bodies are factorised once for all cycles.
 
     Parameters
     ----------
     structure
         The structure.
-    force, relative, amplitudes
-        Contact forces ``(t, 3, n)``, relative displacements ``(t, 3, n)`` and load amplitudes ``(t,
-        cases)`` as in :func:`fe_models.motion.deformation`.
+    cycles
+        Contact forces ``(t, 3, n)`` and relative displacements ``(t, 3, n)`` of each cycle, as in
+        :func:`fe_models.motion.deformation`.
+    amplitudes
+        Amplitudes of the load cases ``(t, cases)``, which all cycles share.
     at
         Increment of the stress fields.
     shown
@@ -193,27 +197,66 @@ def cycle_stress(
     done
         Called after each of the :func:`steps`.
     """
-    # The first increment is that of the fields; one factorisation serves all increments.
-    increments = [at, *shown]
-    motion = structure_motion(structure, force, relative, amplitudes, increments)
+    # Increments of all cycles are columns of one solution; the first of a cycle is that of fields.
+    count, each = len(amplitudes), [at, *shown]
+    starts = count * np.arange(len(cycles))
+    increments = np.add.outer(starts, each).ravel()
+    force, relative = (np.concatenate(fields) for fields in zip(*cycles, strict=True))
+    loads = np.tile(amplitudes, (len(cycles), 1))
+    motion = structure_motion(structure, force, relative, loads, increments.tolist())
     done()
-    fields, surfaces = [], []
+    of_bodies = []
     for body, displacement in zip(structure.bodies, motion.displacements, strict=True):
-        elastic, free = body.elastic, body.free_facets
-        thermal, recovery = body.thermal_strain(amplitudes[increments].T), body.recovery
-        context = free, body.nodes, body.clamped
-        straining = body.straining(displacement, amplitudes[increments].T)
-        field = stress_field(elastic, straining[:, 0], *context, thermal[:, 0], recovery)
-        (moved,) = _of_vertices(elastic, displacement[:, :1])
-        fields.append(replace(field, displacement=moved))
-        if shown:
-            surface = surface_history(elastic, straining[:, 1:], recovery, thermal[:, 1:])
-            moved = _of_vertices(elastic, displacement[:, 1:])[:, surface.vertices]
-            surfaces.append(replace(surface, displacement=moved))
+        thermal = body.thermal_strain(amplitudes[each].T)
+        displacements = np.split(displacement, len(cycles), axis=1)
+        straining = [body.straining(moved, amplitudes[each].T) for moved in displacements]
+        of_bodies.append(_body_stresses(body, displacements, straining, thermal))
         done()
     heated = any(body.expands for body in structure.bodies)
     expansions = _face_expansions(structure, amplitudes) if heated else None
-    return CycleStress(tuple(fields), motion.faces, tuple(surfaces), expansions)
+    faces = [
+        tuple((one[start : start + count], two[start : start + count]) for one, two in motion.faces)
+        for start in starts
+    ]
+    return [
+        CycleStress(
+            tuple(field for field, _ in of_cycle),
+            moved,
+            tuple(surface for _, surface in of_cycle if surface is not None),
+            expansions,
+        )
+        for of_cycle, moved in zip(zip(*of_bodies, strict=True), faces, strict=True)
+    ]
+
+
+def _body_stresses(
+    body: SupportedBody, displacements: list[Array], straining: list[Array], thermal: Array
+) -> list[tuple[StressField, SurfaceHistory | None]]:
+    """Return the stress in the first increment of each cycle, and the surface in the others.
+
+    Parameters
+    ----------
+    body
+        The body.
+    displacements
+        Displacements in each cycle ``(size, k)`` [mm].
+    straining
+        The same without those that cause no strain.
+    thermal
+        Thermal expansions ``(vertices, k)``, the same in all cycles.
+    """
+    elastic, free, recovery = body.elastic, body.free_facets, body.recovery
+    context = free, body.nodes, body.clamped
+    found = []
+    for displacement, strained in zip(displacements, straining, strict=True):
+        field = stress_field(elastic, strained[:, 0], *context, thermal[:, 0], recovery)
+        moved, *others = _of_vertices(elastic, displacement)
+        surface = None
+        if others:
+            surface = surface_history(elastic, strained[:, 1:], recovery, thermal[:, 1:])
+            surface = replace(surface, displacement=np.array(others)[:, surface.vertices])
+        found.append((replace(field, displacement=moved), surface))
+    return found
 
 
 def _face_expansions(structure: Structure, amplitudes: Array) -> tuple[tuple[Array, Array], ...]:

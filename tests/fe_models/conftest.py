@@ -10,7 +10,7 @@ from skfem import MeshTet
 
 from fe_models.dovetail import Mission, dovetail_structure
 from fe_models.elasticity.body import ElasticBody
-from fe_models.elasticity.stress import StressField, cycle_stress
+from fe_models.elasticity.stress import StressField, cycle_stresses
 from fe_models.geometry.dovetail import Dovetail
 from fe_models.joints.friction import FrictionalJoint
 from fe_models.joints.joint import JointStiffness
@@ -26,7 +26,8 @@ def stress_state(
     structure: Structure, force: Array, relative: Array, amplitudes: Array
 ) -> tuple[StressField, StressField]:
     """Return the stress fields of both bodies in one state, a cycle of a single increment."""
-    return cycle_stress(structure, force[None], relative[None], amplitudes[None], 0).fields
+    (found,) = cycle_stresses(structure, [(force[None], relative[None])], amplitudes[None], 0)
+    return found.fields
 
 
 @pytest.fixture(scope="session")

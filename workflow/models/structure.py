@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -16,7 +16,7 @@ from fe_models.elasticity.relinearised import (
     relinearised,
     stress_stiffened,
 )
-from fe_models.elasticity.stress import CycleStress, cycle_stress
+from fe_models.elasticity.stress import CycleStress, cycle_stresses
 from fe_models.joints.friction import FrictionalJoint, FrictionState
 from fe_models.joints.joint import JointResolvent
 from fe_models.loads.pretension import Bolt, tightened
@@ -66,7 +66,6 @@ class StructureLoads(ReportsProgress):
         self._store = NoStore() if store is None else store
         self.from_cache = False
         self._worn: tuple[Array, CycleSolution] | None = None
-        self._on_worn: tuple[StructureMesh, Structure] | None = None
 
     @cached_property
     def mesh(self) -> StructureMesh:
@@ -370,51 +369,28 @@ class StructureLoads(ReportsProgress):
 
     def stresses(
         self,
-        states: Mapping[str, tuple[StructureMesh, CycleSolution]],
+        cycles: Mapping[str, CycleSolution],
         shown: Sequence[int] = (),
         done: Callable[[], None] = lambda: None,
     ) -> dict[str, CycleStress]:
-        """Return the stress of all bodies by state: at peak load and in the increments ``shown``.
+        """Return the stress of all bodies by cycle: at peak load and in the increments ``shown``.
 
-        Each state has its unworn or worn mesh. In the increments ``shown``, stress is that of the
-        surface. For ``done`` see :func:`fe_models.elasticity.stress.cycle_stress`.
+        Worn faces act by the forces of their cycle: depths of micrometres do not change how bodies
+        deform. In the increments ``shown``, stress is that of the surface. For ``done`` see
+        :func:`fe_models.elasticity.stress.cycle_stresses`.
         """
-        jobs = [
-            partial(self._stress, self._on(mesh), of, shown, done) for mesh, of in states.values()
-        ]
-        return dict(zip(states, self.structure.run_parallel(*jobs), strict=True))
+        fields = [cycle.fields() for cycle in cycles.values()]
+        given = [(of["force"], of["displacement"]) for of in fields]
+        amplitudes = self._amplitudes
+        stresses = cycle_stresses(self.structure, given, amplitudes, self.peak, shown, done)
+        return dict(zip(cycles, stresses, strict=True))
 
     def worn_mesh(self, depths: list[tuple[Array, Array]]) -> StructureMesh:
         """Return the mesh whose faces have lost nodal ``depths`` ``(n,)`` of body 1 and 2 [mm].
 
-        The structure on this mesh is built and assembled for :meth:`stresses`. Raises as
-        :func:`fe_models.meshes.remesh.worn_mesh`.
+        Raises as :func:`fe_models.meshes.remesh.worn_mesh`.
         """
-        mesh = worn_mesh(self.mesh, depths)
-        structure = self._on(mesh)
-        # Asking what is held assembles the stiffness, which the bodies store.
-        _ = [body.is_held for body in structure.bodies]
-        self._on_worn = mesh, structure
-        return mesh
-
-    def _on(self, mesh: StructureMesh) -> Structure:
-        """Return the structure on the unworn or the worn mesh."""
-        if mesh is self.mesh:
-            return self.structure
-        if self._on_worn is not None and mesh is self._on_worn[0]:
-            return self._on_worn[1]
-        return self._prestressed(self.model.structure(mesh))
-
-    def _stress(
-        self,
-        structure: Structure,
-        solution: CycleSolution,
-        shown: Sequence[int],
-        done: Callable[[], None],
-    ) -> CycleStress:
-        fields = solution.fields()
-        force, relative = fields["force"], fields["displacement"]
-        return cycle_stress(structure, force, relative, self._amplitudes, self.peak, shown, done)
+        return worn_mesh(self.mesh, depths)
 
     def _gap(self, depths: list[Array]) -> Array:
         pairs = zip(self.mesh.interfaces, depths, strict=True)

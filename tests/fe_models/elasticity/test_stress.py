@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fe_models.elasticity.stress import PeakStress, StressField, cycle_stress, steps
+from fe_models.elasticity.stress import PeakStress, StressField, cycle_stresses, steps
 from fe_models.meshes.remesh import element_volumes
 from fe_models.meshes.structure_mesh import Body
 from sa_solver import von_mises
@@ -135,8 +135,8 @@ def test_faces_move_over_a_cycle_as_the_bodies_do(structure, solved, symmetric, 
     fields = solved(0.4, symmetric).fields()
     force, relative = fields["force"], fields["displacement"]
     amplitudes, done = symmetric.amplitudes(), []
-    cycle = cycle_stress(
-        structure, force, relative, amplitudes, PEAK, [0, PEAK], lambda: done.append(1)
+    (cycle,) = cycle_stresses(
+        structure, [(force, relative)], amplitudes, PEAK, [0, PEAK], lambda: done.append(1)
     )
     assert len(done) == steps(2)
     start = 0

@@ -6,7 +6,7 @@ from skfem import MeshTet, MeshTri
 
 from fe_models.elasticity.body import ElasticBody
 from fe_models.elasticity.relinearised import relinearised
-from fe_models.elasticity.stress import cycle_stress, stress_field
+from fe_models.elasticity.stress import cycle_stresses, stress_field
 from fe_models.elasticity.thermal import NodalTemperature, TemperatureChange, thermal_gradient
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import (
@@ -214,7 +214,8 @@ def test_heated_bar_of_two_pieces_presses(order):
     np.testing.assert_allclose(history.loads.P, 2.0 * pressed, rtol=1e-8)
     assert cycle.equilibrium.max() < 1e-9
     amplitudes = np.array([[0.5, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    found = cycle_stress(joined, history.force, history.displacement, amplitudes, 1, [0, 2])
+    fields = history.force, history.displacement
+    (found,) = cycle_stresses(joined, [fields], amplitudes, 1, [0, 2])
     for stress in found.fields:
         exact = np.outer([0, 0, -whole, 0, 0, 0], np.ones(stress.stress.shape[1]))
         np.testing.assert_allclose(stress.stress, exact, atol=1e-6 * whole)
@@ -232,7 +233,8 @@ def test_no_temperature_changes_nothing():
     joined, _ = two_pieces(1, [TemperatureChange(HOT)], (Material(200e3, 0.3),) * 2)
     assert not any(body.expands for body in joined.bodies)
     force = np.zeros((1, 3, len(joined.gap())))
-    assert cycle_stress(joined, force, force, np.ones((1, 1)), 0).expansions is None
+    (found,) = cycle_stresses(joined, [(force, force)], np.ones((1, 1)), 0)
+    assert found.expansions is None
 
 
 @pytest.mark.parametrize(

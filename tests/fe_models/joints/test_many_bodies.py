@@ -7,7 +7,7 @@ import pytest
 from skfem import MeshTet, MeshTri
 
 from fe_models.elasticity.body import ElasticBody
-from fe_models.elasticity.stress import cycle_stress
+from fe_models.elasticity.stress import cycle_stresses
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
 from fe_models.joints import friction
@@ -215,9 +215,8 @@ def test_columns_are_springs_in_series():
     top = structure.bodies[3].elastic.boundary_nodes("bar3_z1")
     shortened = 100.0 * sum(length / young for length, young in zip(heights, moduli, strict=True))
     np.testing.assert_allclose(moved[3].reshape(-1, 3)[top, 2], -shortened, rtol=1e-8)
-    stress = cycle_stress(
-        structure, state.force[None], state.displacement[None], np.ones((1, 1)), 0
-    )
+    fields = state.force[None], state.displacement[None]
+    (stress,) = cycle_stresses(structure, [fields], np.ones((1, 1)), 0)
     for field in stress.fields:
         np.testing.assert_allclose(field.stress[2], -100.0, rtol=1e-6)
 

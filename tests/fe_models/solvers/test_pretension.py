@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from skfem import MeshTet
 
-from fe_models.elasticity.stress import cycle_stress
+from fe_models.elasticity.stress import cycle_stresses
 from fe_models.imported_structure import Support
 from fe_models.joints import friction
 from fe_models.joints.friction import FrictionalJoint
@@ -91,9 +91,8 @@ def test_tension_is_what_the_faces_carry_and_the_rods_are_strained_by(order):
     assert under == pytest.approx(over, rel=1e-9)
     assert structure.equilibrium_errors(states, np.array([[0.01]])).max() < 1e-9
     # Stress of both rods together, off their ends, over their areas of 0.5 mm² each.
-    stress = cycle_stress(
-        structure, state.force[None], state.displacement[None], np.array([[0.01]]), 0
-    )
+    fields = state.force[None], state.displacement[None]
+    (stress,) = cycle_stresses(structure, [fields], np.array([[0.01]]), 0)
     frame = stress.fields[1]
     points = frame.body.points
     rods = np.isclose(points[:, 2], HEIGHT / 2) | np.isclose(points[:, 2], HEIGHT / 3)

@@ -9,7 +9,7 @@ from fe_models import structure
 from fe_models.cyclic.cuts import Cuts
 from fe_models.cyclic.sector import check_jumps, sector_cuts
 from fe_models.elasticity.body import ElasticBody
-from fe_models.elasticity.stress import cycle_stress
+from fe_models.elasticity.stress import cycle_stresses
 from fe_models.elasticity.thermal import NodalTemperature
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
@@ -111,9 +111,8 @@ def test_contacts_of_a_sector_are_those_of_the_wheel(dimension, order, supports,
     fields = []
     for joined, cycle, path in ((part, mine, PATH), (ring, theirs, every)):
         all_ = cycle.fields()
-        fields.append(
-            cycle_stress(joined, all_["force"], all_["displacement"], path, at=1, shown=[0, 2])
-        )
+        given = [(all_["force"], all_["displacement"])]
+        fields += cycle_stresses(joined, given, path, at=1, shown=[0, 2])
     for own, whole, *surfaces in zip(
         fields[0].fields,
         fields[1].fields[:2],

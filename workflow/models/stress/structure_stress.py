@@ -42,11 +42,10 @@ class StressedStructure:
     ) -> StressedStructure:
         """Return the structure with its stresses at peak load, and in the increments ``shown``.
 
-        For ``done`` see :func:`fe_models.elasticity.stress.cycle_stress`.
+        For ``done`` see :func:`fe_models.elasticity.stress.cycle_stresses`.
         """
         cycles = {"unworn": source.unworn_cycle, "worn": cycle}
-        states = {"unworn": (source.mesh, cycles["unworn"]), "worn": (mesh, cycle)}
-        stresses = source.stresses(states, shown, done)
+        stresses = source.stresses(cycles, shown, done)
         return cls(source, mesh, cycle, with_local_models(source, cycles, stresses))
 
     def under(

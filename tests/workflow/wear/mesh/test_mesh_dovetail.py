@@ -102,9 +102,9 @@ def test_local_models_of_a_mesh_agree_with_those_of_the_dovetail(tmp_path, small
     )
     fields = []
     for stage in stages:
-        states = {"unworn": (stage.mesh, stage.unworn_cycle)}
-        stresses = stage.stresses(states)
-        local = with_local_models(stage, {"unworn": stage.unworn_cycle}, stresses)
+        cycles = {"unworn": stage.unworn_cycle}
+        stresses = stage.stresses(cycles)
+        local = with_local_models(stage, cycles, stresses)
         fields.append(local["unworn"].fields)
         for before, after in zip(stresses["unworn"].fields, fields[-1], strict=True):
             assert after.local is not None
@@ -141,10 +141,8 @@ def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkey
             two.slip[..., order], one.slip, atol=1e-6 * np.abs(one.slip).max()
         )
     # Nobody tells which surfaces are free but supports, loads and contacts.
-    states = ({"unworn": (stage.mesh, stage.unworn_cycle)} for stage in (ours, theirs))
     fields = [
-        stage.stresses(state)["unworn"].fields
-        for stage, state in zip((ours, theirs), states, strict=True)
+        stage.stresses({"unworn": stage.unworn_cycle})["unworn"].fields for stage in (ours, theirs)
     ]
     for one, two in zip(*fields, strict=True):
         for here, there in ((one.peak, two.peak), (one.notch, two.notch)):

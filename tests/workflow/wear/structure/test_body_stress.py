@@ -54,8 +54,7 @@ class Flank:
         case = load_case(PLANE, overrides)
         source = loads_of(case)
         assert isinstance(source, StructureLoads)
-        states = {"unworn": (source.mesh, source.unworn_cycle)}
-        stress = source.stresses(states)["unworn"]
+        stress = source.stresses({"unworn": source.unworn_cycle})["unworn"]
         stage, loads = face_contact(case, source.faces[0]), source.unworn()[0]
         given = stage.contact.unworn_tractions(loads, stage.contact.begin(loads, 1.0)[1])
         known = with_known_shear(stage, given, loads)

@@ -312,7 +312,7 @@ def worn_structure(
         ) as unfinished:
             write_msh(unfinished, written["worn"])
     with reporter.stage("stress", "steps") as reported:
-        done = Tally(reported, 2 * steps(len(mesh.bodies)))
+        done = Tally(reported, steps(len(mesh.bodies)))
         shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
         stressed = StressedStructure.of(stage, mesh, cycle, shown, done)
     return WornStructure(stressed, written, shown)
