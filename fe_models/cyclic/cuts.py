@@ -243,7 +243,7 @@ class Cuts:
             np.searchsorted(high, elastic.facet_nodes(self.high)),
             frame.coordinates(images),
             np.searchsorted(low, elastic.facet_nodes(self.low)),
-            elastic.order,
+            elastic.node_order,
         )
         sizes = [_sizes(elastic.body, facets).sum() for facets in (self.low, self.high)]
         uncovered = max(1.0 - tied, 1.0 - tied * sizes[1] / sizes[0])

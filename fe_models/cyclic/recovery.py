@@ -125,7 +125,7 @@ class _Beyond:
         size = float(np.linalg.norm(np.ptp(elastic.nodes, axis=0)))
         self._same = SAME * size + len(parts) * max(pair.max_distance for pair in cuts)
         body = self._meshed(parts, free)
-        wide = ElasticBody(body, elastic.material, elastic.order)
+        wide = ElasticBody(body, elastic.material, elastic.node_order)
         self.recovery = StressRecovery(wide, body.mesh.boundaries["free"])
         self._sources, self._turns = self._images(wide.nodes, list(parts))
 

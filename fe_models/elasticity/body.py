@@ -11,12 +11,16 @@ from skfem import (
     Basis,
     BilinearForm,
     Element,
+    ElementLineP1,
+    ElementLineP2,
     ElementTetP1,
     ElementTetP2,
     ElementTriP1,
     ElementTriP2,
     FacetBasis,
     LinearForm,
+    MeshLine,
+    MeshTri,
 )
 from skfem.helpers import grad
 
@@ -42,7 +46,20 @@ class ElasticBody:
 
     Triangles are in plane strain; their forces are per length. Vertices are the first nodes; with
     elements of ``order`` 2 the midside nodes follow. Elements of order 2 are curved if the body has
-    midside nodes (:mod:`fe_models.meshes.isoparametric`).
+    midside nodes (:mod:`fe_models.meshes.isoparametric`). If it has ``elements`` of second order,
+    all nodes are vertices of its mesh.
+
+    Attributes
+    ----------
+    node_order
+        2 if midside nodes follow the vertices of the body's mesh, else 1.
+    curved
+        Whether midside nodes that follow the vertices are off the middles of their edges.
+
+    Raises
+    ------
+    ValueError
+        If a body with elements of second order is given another order.
 
     Examples
     --------
@@ -67,9 +84,15 @@ class ElasticBody:
         self.body = body
         self.material = material
         self.order = order
+        if body.elements is not None and order != 2:
+            raise ValueError(f"{body.name} has elements of second order, not of order {order}")
         self.dimension = body.mesh.dim()
+        self.node_order = order if body.elements is None else 1
+        self.curved = self.node_order == 2 and body.midsides is not None
+        # The body whose mesh has the elements, with boundaries of the same names.
+        self._of = body if body.elements is None else body.elements
+        self._mapped = order == 2 and self._of.midsides is not None
         self._element = ELEMENTS[self.dimension, order]
-        self.curved = order == 2 and body.midsides is not None
         self._basis = self.basis()
 
     def basis(self, degree: int | None = None) -> Basis:
@@ -77,11 +100,11 @@ class ElasticBody:
 
         The degree holds on straight elements.
         """
-        if not self.curved:
-            return Basis(self.body.mesh, self._element(), intorder=degree)
-        mapping = mapping_of(self.body)
+        if not self._mapped:
+            return Basis(self._of.mesh, self._element(), intorder=degree)
+        mapping = mapping_of(self._of)
         intorder = max(INTEGRATED, degree or 0)
-        basis = Basis(self.body.mesh, self._element(), mapping, intorder)
+        basis = Basis(self._of.mesh, self._element(), mapping, intorder)
         # The cached Jacobians of all elements are not needed any more.
         vars(mapping).pop("_cache", None)
         return basis
@@ -93,7 +116,9 @@ class ElasticBody:
 
     @property
     def element_nodes(self) -> Indices:
-        """Nodes of the elements ``(k, elements)``, midside nodes included."""
+        """Nodes of the elements of the body's mesh ``(k, elements)``, midside nodes included."""
+        if self.body.elements is not None:
+            return np.asarray(self.body.mesh.t)
         return np.asarray(self._basis.element_dofs)
 
     @property
@@ -110,7 +135,7 @@ class ElasticBody:
         the time of its vector form. The matrix has entries between all components of nodes that
         share an element, whatever the shape of the elements.
         """
-        sums, d = _NodePairs(self.element_nodes), self.dimension
+        sums, d = _NodePairs(np.asarray(self._basis.element_dofs)), self.dimension
         gradients = [np.asarray(field.grad) for (field,) in self._basis.basis]
         weights = self._basis.dx
         if self.order == 1:
@@ -195,7 +220,7 @@ class ElasticBody:
 
         ``density`` is ``(vertices, 3)`` [N/mm³].
         """
-        linear = self._basis.with_element(ELEMENTS[self.dimension, 1]())
+        linear = self._vertex_basis
         form = LinearForm(lambda v, w: w.f * v)
         loads = [
             form.assemble(self._basis, f=linear.interpolate(density[:, axis]))
@@ -212,7 +237,7 @@ class ElasticBody:
         mesh = self.body.mesh
         nodal = loads.reshape(-1, self.dimension)
         forces = nodal[: mesh.nvertices].copy()
-        if self.order == 2:
+        if self.node_order == 2:
             # A linear function has half of its ends' values at a midside node.
             for end in mesh_edges(mesh).T:
                 np.add.at(forces, end, 0.5 * nodal[mesh.nvertices :])
@@ -225,9 +250,8 @@ class ElasticBody:
 
         They are ∫ (3 λ + 2 G) θ div φ_i, in plane strain too (:mod:`fe_models.elasticity.thermal`).
         """
-        linear = self._basis.with_element(ELEMENTS[self.dimension, 1]())
         pressure = 3.0 * self.material.lame + 2.0 * self.material.shear_modulus
-        held = linear.interpolate(pressure * strain)
+        held = self._vertex_basis.interpolate(pressure * strain)
         forms = [
             LinearForm(lambda v, w, a=a: w.held * grad(v)[a]).assemble(self._basis, held=held)
             for a in range(self.dimension)
@@ -274,7 +298,8 @@ class ElasticBody:
             np.add.at(normals, self.body.facet_nodes(facets), at_nodes)
             normals = whole(normals)
         else:
-            basis = self._facet_basis(boundary, ELEMENTS[self.dimension, 1]())
+            linear = ELEMENTS[self.dimension, 1]()
+            basis = FacetBasis(mesh, linear, facets=mesh.boundaries[boundary])
             normals[: mesh.nvertices] = _normal_integrals(basis)
             normals = whole(normals)
             middle, parents = self.midsides(boundary)
@@ -289,7 +314,7 @@ class ElasticBody:
         """
         mesh = self.body.mesh
         corners: Indices = mesh.facets[:, facets].T
-        if self.order == 1:
+        if self.node_order == 1:
             return corners
         if self.dimension == 2:
             return np.column_stack([corners, self._basis.facet_dofs[0, facets]])
@@ -303,7 +328,7 @@ class ElasticBody:
 
     def midsides(self, boundary: str) -> tuple[Indices, Indices]:
         """Return a boundary's midside nodes ``(n,)`` and the ends of their edges ``(n, 2)``."""
-        if self.order == 1:
+        if self.node_order == 1:
             return np.empty(0, np.int64), np.empty((0, 2), np.int64)
         mesh = self.body.mesh
         facets = mesh.boundaries[boundary]
@@ -321,9 +346,11 @@ class ElasticBody:
         ``(m,)``. The matrices are ``(v, v)`` for all vertices and ``(v, n)`` for all vertices and
         nodes.
         """
-        mesh = self.body.mesh
+        mesh = self._of.mesh
         facets = np.asarray(mesh.boundaries[boundary])
         facets = facets[np.isin(mesh.facets[:, facets], vertices).all(axis=0)]
+        if self.body.elements is not None:
+            return self._halved_moments(facets)
         linear = ELEMENTS[self.dimension, 1]()
         # The degree makes products of linear functions and the elements' functions exact.
         tests, trials = (
@@ -332,6 +359,31 @@ class ElasticBody:
         )
         product = BilinearForm(lambda u, v, w: u * v)
         return product.assemble(tests).tocsr(), product.assemble(trials, tests).tocsr()
+
+    def _halved_moments(self, facets: Indices) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """Return the :meth:`linear_moments` over plane facets of elements that are halved.
+
+        The linear functions are those of the halves or quarters of the facets.
+        """
+        nodes, size = self._of.facet_nodes(facets), self.nodes.shape[0]
+        areas = np.linalg.norm(self._of.outward_of(facets), axis=1)
+        shape = nodes.shape + nodes.shape[1:]
+        rows = np.broadcast_to(nodes[:, :, None], shape).ravel()
+        columns = np.broadcast_to(nodes[:, None, :], shape).ravel()
+        products, moments = (
+            sp.csr_matrix(
+                ((areas[:, None, None] * on_facet).ravel(), (rows, columns)), (size, size)
+            )
+            for on_facet in _moments_on_facet(self.dimension)
+        )
+        return products, moments
+
+    @property
+    def _vertex_basis(self) -> Basis:
+        """Basis of fields with values at the vertices of the body's mesh."""
+        if self.body.elements is not None:
+            return self._basis
+        return self._basis.with_element(ELEMENTS[self.dimension, 1]())
 
     def stress(self, displacement: Array) -> Array:
         """Return the mean Cauchy stress of each element ``(6, elements)`` [MPa].
@@ -363,9 +415,9 @@ class ElasticBody:
 
         It is that of the displacements unless another ``element`` is given.
         """
-        mesh, mapping = self.body.mesh, None
-        if self.curved:
-            mapping, degree = mapping_of(self.body), max(INTEGRATED, degree or 0)
+        mesh, mapping = self._of.mesh, None
+        if self._mapped:
+            mapping, degree = mapping_of(self._of), max(INTEGRATED, degree or 0)
         facets = mesh.boundaries[boundary] if isinstance(boundary, str) else boundary
         return FacetBasis(mesh, element or self._element(), mapping, degree, facets=facets)
 
@@ -392,6 +444,30 @@ class _NodePairs:
     def of(self, values: Sequence[Array]) -> Array:
         """Return sums ``(pairs,)`` of ``k²`` arrays ``(m,)``, one per pair of element nodes."""
         return np.asarray(self._sum @ np.concatenate(values))
+
+
+def _moments_on_facet(dimension: int) -> tuple[Array, Array]:
+    """Return ∫ φ_i φ_k dA and ∫ φ_i N_j dA over a facet of unit area with quadratic functions N.
+
+    φ are linear on the halves or quarters of the facet. Both are in the order of
+    :meth:`Body.facet_nodes`.
+    """
+    kind, linear, quadratic = (
+        (MeshTri, ElementTriP1, ElementTriP2)
+        if dimension == 3
+        else (MeshLine, ElementLineP1, ElementLineP2)
+    )
+    whole = kind.init_refdom()
+    halves, element = Basis(whole.refined(), linear(), intorder=3), quadratic()
+    points = np.asarray(halves.global_coordinates())
+    functions = [element.lbasis(points, j)[0] for j in range(len(element.doflocs))]
+    apart = np.linalg.norm(halves.doflocs[:, None, :] - element.doflocs.T[:, :, None], axis=0)
+    products = BilinearForm(lambda u, v, w: u * v).assemble(halves).toarray()
+    form = LinearForm(lambda v, w: w.f * v)
+    moments = np.stack([form.assemble(halves, f=function) for function in functions], axis=1)
+    order = apart.argmin(axis=1)
+    area = products.sum()
+    return products[np.ix_(order, order)] / area, moments[order] / area
 
 
 def _normal_integrals(basis: FacetBasis) -> Array:

@@ -9,14 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.meshes.curved_face import edge_numbers
+from fe_models.meshes.halving import halved_mesh
 from fe_models.meshes.isoparametric import folded
-from fe_models.meshes.structure_mesh import (
-    Body,
-    MeshError,
-    mesh_edges,
-    named_mesh,
-    numbered_as,
-)
+from fe_models.meshes.structure_mesh import Body, MeshError, mesh_edges, named_mesh
 from sa_solver.types import Array, Indices
 
 CUT = "cut"
@@ -101,23 +96,14 @@ class MeshPatch:
 
         Raises :class:`MeshError` if a curved element folds.
         """
-        mesh, edges = self.body.mesh, mesh_edges(self.body.mesh)
-        count = mesh.nvertices
-        # The middles of the edges are the new vertices, in the order of the edges.
-        plain = numbered_as(mesh, type(mesh)(mesh.p, mesh.t))
-        cells = np.asarray(plain.refined().t.T)
-        corners = {
-            name: self._halved(mesh.facets[:, facets].T) for name, facets in mesh.boundaries.items()
-        }
+        fine, count = halved_mesh(self.body), self.body.mesh.nvertices
+        edges = mesh_edges(self.body.mesh)
         ends = sp.csr_matrix(
             (np.full(2 * len(edges), 0.5), (np.repeat(np.arange(len(edges)), 2), edges.ravel())),
             shape=(len(edges), count),
         )
         linear = sp.vstack([sp.identity(count), ends], format="csr")
-        nodes = linear @ mesh.p.T
-        if self.body.midsides is not None:
-            nodes[count:] = self.body.midsides
-        fine = named_mesh(nodes, cells, corners)
+        nodes = fine.p.T
         between = self._between(mesh_edges(fine))
         quadratic = sp.vstack([sp.identity(len(nodes)), between], format="csr")
         midsides = None if self.body.midsides is None else np.asarray(between @ nodes)
@@ -125,22 +111,6 @@ class MeshPatch:
         if midsides is not None and folded(body).any():
             raise MeshError(f"curved elements of {body.name} fold when they are refined")
         return MeshPatch(body, quadratic @ self.of_nodes, linear @ self.of_vertices)
-
-    def _halved(self, facets: Indices) -> Indices:
-        """Return the corners of the halves or quarters of facets ``(m, dim)``."""
-        mesh, edges = self.body.mesh, mesh_edges(self.body.mesh)
-
-        def middle(one: int, two: int) -> Indices:
-            return mesh.nvertices + edge_numbers(edges, facets[:, [one, two]])
-
-        if facets.shape[1] == 2:
-            half = middle(0, 1)
-            return np.concatenate([np.stack([end, half], axis=1) for end in facets.T])
-        middles = middle(0, 1), middle(1, 2), middle(2, 0)
-        parts = [np.stack(middles, axis=1)]
-        for k, corner in enumerate(facets.T):
-            parts.append(np.stack([corner, middles[k], middles[k - 1]], axis=1))
-        return np.concatenate(parts)
 
     def _between(self, fine_edges: Indices) -> sp.csr_matrix:
         """Return the values of quadratic fields in the middle of the edges of the refined mesh.

@@ -185,7 +185,16 @@ def _moved(body: Body, displacement: Array) -> Body:
     if midsides is not None:
         # The displacement is linear between vertices, so edges keep their bulges.
         midsides = midsides + displacement[mesh_edges(body.mesh)].mean(axis=1)
-    return replace(body, mesh=numbered_as(body.mesh, mesh), midsides=midsides)
+    mesh, elements = numbered_as(body.mesh, mesh), body.elements
+    if elements is not None:
+        nodes = mesh.p.T
+        of_elements = replace(elements.mesh, doflocs=nodes[: elements.mesh.nvertices].T)
+        elements = replace(
+            elements,
+            mesh=numbered_as(elements.mesh, of_elements),
+            midsides=nodes[elements.mesh.nvertices :],
+        )
+    return replace(body, mesh=mesh, midsides=midsides, elements=elements)
 
 
 def _crushed(before: Body, after: Body) -> bool:

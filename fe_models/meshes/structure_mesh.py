@@ -58,6 +58,10 @@ class Body:
         Positions of the midside nodes of elements of second order ``(edges, dim)`` [mm], in the
         order of the mesh's edges (in the plane: its facets). If None, they are in the middle of the
         edges.
+    elements
+        Body of second-order elements whose vertices and midside nodes are the vertices of this
+        mesh, in that order (:func:`fe_models.meshes.halving.halved`). If None, the mesh itself
+        has the elements.
 
     Examples
     --------
@@ -76,6 +80,7 @@ class Body:
     name: str
     mesh: MeshTet | MeshTri
     midsides: Array | None = field(default=None, kw_only=True)
+    elements: Body | None = field(default=None, kw_only=True)
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -336,9 +341,10 @@ class StructureMesh:
     def node_count(self, order: int) -> int:
         """Return the number of nodes of all bodies, with midside nodes for elements of order 2."""
         count = 0
-        for mesh in (body.mesh for body in self.bodies):
+        for body in self.bodies:
+            mesh = body.mesh
             count += mesh.nvertices
-            if order == 2:
+            if order == 2 and body.elements is None:
                 count += mesh.nedges if mesh.dim() == 3 else mesh.nfacets
         return int(count)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
+from math import ceil
 from numbers import Real
 from typing import Literal
 
@@ -49,26 +50,26 @@ class DovetailMesh:
     Parameters
     ----------
     flank_nodes : (int, int)
-        Nodes across each flank and along the slot.
+        Nodes across each flank and along the slot; odd numbers with elements of order 2.
     size : float
-        Size of the elements away from the flanks [mm].
+        Distance of the nodes away from the flanks [mm].
     notch : int
-        Elements round a full circle of a fillet.
+        Nodes round a full circle of a fillet.
     order : {1, 2}
-        Order of the elements.
+        Order of the elements. Those of order 2 take the same nodes and are twice as long.
 
     Examples
     --------
     >>> import fretscale
-    >>> fine = fretscale.DovetailMesh(flank_nodes=(39, 67), size=2.5, order=2)
+    >>> fine = fretscale.DovetailMesh(flank_nodes=(41, 45), size=4.0)
     >>> print(fine.notch)
-    48
+    24
     """
 
-    flank_nodes: tuple[int, int] = (20, 34)
-    size: float = 5.0
-    notch: int = 48
-    order: Literal[1, 2] = 1
+    flank_nodes: tuple[int, int] = (21, 23)
+    size: float = 8.0
+    notch: int = 24
+    order: Literal[1, 2] = 2
 
     def __post_init__(self) -> None:
         checks.wholes(self, "order", least=1, most=2)
@@ -80,13 +81,24 @@ class DovetailMesh:
                 f"DovetailMesh.flank_nodes is {self.flank_nodes}: give two numbers of nodes, "
                 f"{FEWEST_NODES} or more across a flank and along the slot"
             )
+        if self.order == 2 and not all(count % 2 for count in self.flank_nodes):
+            raise InputError(
+                f"DovetailMesh.flank_nodes is {self.flank_nodes}: elements of order 2 have three "
+                "nodes along an edge, so give odd numbers of nodes"
+            )
 
     def refined(self, factor: float) -> DovetailMesh:
         """Return the mesh with elements that are finer by ``factor``; its notches stay the same."""
         across, along = (
-            max(FEWEST_NODES, 1 + round(factor * (count - 1))) for count in self.flank_nodes
+            max(FEWEST_NODES, 1 + self.order * round(factor * (count - 1) / self.order))
+            for count in self.flank_nodes
         )
         return replace(self, flank_nodes=(across, along), size=self.size / factor)
+
+    def of_order(self, order: Literal[1, 2]) -> DovetailMesh:
+        """Return the mesh with elements of an ``order``, and a node more where that takes one."""
+        across, along = (1 + order * ceil((count - 1) / order) for count in self.flank_nodes)
+        return replace(self, flank_nodes=(across, along), order=order)
 
 
 @dataclass(frozen=True)
@@ -144,7 +156,7 @@ class DovetailJoint:
     added: Mapping[str, AddedGap] = field(default_factory=dict)
     nonlinearity: Nonlinearity = field(default_factory=Nonlinearity)
     finer: str = field(
-        default="give flanks more nodes and notches more elements, or take elements of order 2",
+        default="give flanks and notches more nodes, or take elements of order 2",
         compare=False,
     )
 
@@ -259,7 +271,7 @@ class DovetailJoint:
         second order.
         """
         share = 1.0 if self.order == 1 else share_of_difference(2.0, MESH_ORDER)
-        return FinerMesh(replace(self, mesh=replace(self.mesh.refined(2.0), order=2)), share)
+        return FinerMesh(replace(self, mesh=self.mesh.of_order(2).refined(2.0)), share)
 
     def notch_models(
         self, tractions: Sequence[FaceTraction], amplitudes: Array
@@ -311,4 +323,4 @@ def dovetail_mesh(
 
     Raises MeshError where the section cannot be drawn.
     """
-    return geometry.mesh(mesh.flank_nodes, mesh.size, dimension, mesh.notch)
+    return geometry.mesh(mesh.flank_nodes, mesh.size, dimension, mesh.notch, mesh.order)

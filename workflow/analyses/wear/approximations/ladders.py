@@ -7,7 +7,7 @@ case admits.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from workflow.analyses.contact.case import HEIGHTS
 from workflow.analyses.wear.approximations.approximation import Rung, Settings, entry_at
@@ -193,8 +193,17 @@ def _elements(case: Any, factor: float) -> dict[str, Any]:
 
 def orders(case: Case) -> Iterator[Rung]:
     """Yield finite elements of first and of second order."""
-    for order in (1, 2):
-        yield Rung(f"order {order}", {"mesh.order": order})
+    orders: tuple[Literal[1, 2], ...] = (1, 2)
+    for order in orders:
+        yield Rung(f"order {order}", _of_order(case, order))
+
+
+def _of_order(case: Any, order: Literal[1, 2]) -> dict[str, Any]:
+    """Return settings of elements of an order; the nodes of a dovetail's flank depend on it."""
+    settings: dict[str, Any] = {"mesh.order": order}
+    if entry_at(case, "mesh.flank_nodes") is not None:
+        settings["mesh.flank_nodes"] = case.mesh.described().of_order(order).flank_nodes
+    return settings
 
 
 def links(case: Case) -> Iterator[Rung]:
@@ -226,7 +235,7 @@ def references(case: Case) -> Iterator[Rung]:
         "wear.step": {"kind": "second_order"},
     }
     if entry_at(case, "mesh.order") is not None:
-        settings["mesh.order"] = 2
+        settings |= _of_order(case, 2)
     if entry_at(case, "load_path.increments") is not None:
         settings |= _in_increments(case, 2.0).settings
     for rung in _refined_or_own(case, MESHES_ALONE):

@@ -38,7 +38,7 @@ from workflow.models.wear import WearModel
 
 # Settings of a probe run along the axes that it does not vary: cells across a flank, and nodes
 # across it. Differences along one axis hardly depend on them.
-CELLS, NODES = 64, 10
+CELLS, NODES = 64, 11
 # Elements round a fillet, whose stress no probe run needs.
 NOTCH = 16
 

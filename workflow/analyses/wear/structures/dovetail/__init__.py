@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 # Stored fields per cell and increment: slips, depths per pressure, pressures, starts.
 FIELDS = 12
-# Nodes of both bodies in space, per node of a flank and by their volume; the factor for quadratic
-# elements.
-FLANK_NODES, VOLUME_NODES, QUADRATIC = 40.0, 1.5, 7.0
+# Nodes of both bodies in space: per node of a flank, by the order of the elements, and by their
+# volume.
+FLANK_NODES, VOLUME_NODES = {1: 40.0, 2: 50.0}, 1.5
 
 
 def _model(case: DovetailCase) -> StructureModel:
@@ -52,9 +52,8 @@ def _extent(case: DovetailCase) -> Extent:
     sector = 2.0 * pi * structure.rim_radius / structure.blades * structure.disk_height
     blade = structure.shank_height * structure.neck_width
     volume = (sector + blade) * structure.slot_length
-    nodes = FLANK_NODES * across * along + VOLUME_NODES * volume / case.mesh.size**3
-    if case.mesh.order == 2:
-        nodes *= QUADRATIC
+    of_flanks = FLANK_NODES[case.mesh.order] * across * along
+    nodes = of_flanks + VOLUME_NODES * volume / case.mesh.size**3
     return Extent(
         increments, faces, nodes, faces * across * along, dissipating=DISSIPATING, section=section
     )
@@ -84,7 +83,10 @@ def _settings(case: DovetailCase) -> dict[str, str]:
     mesh = flank_mesh(case, 2.0)
     nodes = f"mesh.flank_nodes: {list(mesh['mesh.flank_nodes'])}"
     finer = f"{nodes} and mesh.size: {mesh['mesh.size']:g} mm"
-    return {"link": nodes, "mesh": "mesh.order: 2" if case.mesh.order == 1 else finer}
+    if case.mesh.order == 1:
+        quadratic = case.mesh.described().of_order(2).flank_nodes
+        finer = f"mesh.order: 2 and mesh.flank_nodes: {list(quadratic)}"
+    return {"link": nodes, "mesh": finer}
 
 
 STRUCTURE = WearStructure(

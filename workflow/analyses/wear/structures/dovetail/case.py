@@ -314,13 +314,28 @@ class Mesh(Section):
     """Tetrahedra of the structure."""
 
     flank_nodes: tuple[FlankNodes, FlankNodes] = entry(
-        "number of nodes across the flank, along the slot", [20, 34], default=(20, 34)
+        "number of nodes across the flank, along the slot", [21, 23], default=(21, 23)
     )
-    size: Length = entry("size of the elements away from the flanks [mm]", "5 mm", default=5.0)
+    size: Length = entry("distance of the nodes away from the flanks [mm]", "8 mm", default=8.0)
     notch: Annotated[int, Whole(8, 1000)] = entry(
-        "elements round a full circle of a fillet whose stress is reported", 48, default=48
+        "nodes round a full circle of a fillet", 24, default=24
     )
-    order: Literal[1, 2] = entry("order of the tetrahedra, 1 or 2", 1, default=1)
+    order: Literal[1, 2] = entry(
+        "order of the tetrahedra, 1 or 2; those of order 2 join an odd number of flank nodes",
+        2,
+        default=2,
+    )
+
+    @model_validator(mode="after")
+    def _nodes_make_elements(self) -> Mesh:
+        if self.order == 2 and not all(count % 2 for count in self.flank_nodes):
+            odd = [count + 1 - count % 2 for count in self.flank_nodes]
+            raise disagreement(
+                f"{list(self.flank_nodes)}: elements of order 2 have three nodes along an edge; "
+                f"allowed: odd numbers, such as {odd}, or order 1",
+                *("flank_nodes", "order"),
+            )
+        return self
 
     def described(self) -> DovetailMesh:
         """Return the mesh as the model takes it."""
