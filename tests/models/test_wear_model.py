@@ -106,7 +106,7 @@ def test_a_plane_joint_has_the_stress_of_its_case(tmp_path, monkeypatch):
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
     case = fretscale.load_case(
         CASES / "dovetail_2d.yaml",
-        mesh__flank_nodes=[10, 10],
+        mesh__flank_nodes=[11, 11],
         mesh__size=8.0,
         contact__grid=48,
         load_path__increments=[3, 5],
@@ -271,7 +271,7 @@ def test_cases_without_a_model_are_refused():
 def test_nodes_that_wear_need_no_other_loads():
     """Every step solves the structure, so that its loads are never followed as well."""
     joint = script("dovetail_joint").model.structure
-    plane = replace(joint, dimension=2, mesh=fretscale.DovetailMesh((10, 10), 8.0))
+    plane = replace(joint, dimension=2, mesh=fretscale.DovetailMesh((11, 11), 8.0))
     titanium, law = Material(115e3, 0.29), EnergyLaw(1e-8)
     contact = fretscale.Contact(
         (24, 1), (titanium, titanium), (law, law), friction=0.4, method="nodes"
@@ -298,7 +298,7 @@ def test_contacts_are_found_by_name(model):
 def test_a_profile_is_added_to_structure_and_contact():
     joint = script("dovetail_joint").model.structure
     groove = fretscale.AddedGap(lambda x, y: 2e-3 * np.exp(-(x**2)) + 0.0 * y)
-    changed = {"dimension": 2, "mesh": fretscale.DovetailMesh((10, 10), 8.0)}
+    changed = {"dimension": 2, "mesh": fretscale.DovetailMesh((11, 11), 8.0)}
     plain, grooved = (
         type(joint)(**vars(joint) | changed | {"added": added})
         for added in ({}, {"intrados": groove})

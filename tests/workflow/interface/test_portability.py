@@ -25,7 +25,7 @@ HIDE = f"import psutil, sys; sys.modules.update(dict.fromkeys({POSIX_MODULES!r})
 
 SMALL = (
     "load_path.increments=[3, 5]",
-    "mesh={flank_nodes: [4, 6], size: 12 mm, notch: 16}",
+    "mesh={flank_nodes: [5, 7], size: 12 mm, notch: 16}",
     "contact.grid=[16, 32]",
     "wear.cycles=1e4",
     "error_budget=known",

@@ -20,7 +20,7 @@ from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
 from workflow.models.structure import StructureLoads
 
-COARSE = "mesh.flank_nodes=[10, 10]", "mesh.size=8", "contact.grid=[48, 64]"
+COARSE = "mesh.flank_nodes=[11, 11]", "mesh.size=8", "contact.grid=[48, 64]"
 QUIET = "output.paraview=false", "output.figures=false", "stress.section=none"
 SHORT = ("load_path.increments=[3, 5]",)
 LOW = "rotation_speed: 4500 rpm, aerodynamic_moment: 20 N*m"

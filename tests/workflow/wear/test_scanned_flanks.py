@@ -43,13 +43,13 @@ def test_a_finer_mesh_of_the_joint_has_the_scans_at_its_own_nodes(tmp_path):
     """A slope is that of the scan within the steps of eight cells a facet, half of 1.2 mm / 8."""
     x, tilt = (np.arange(1100) + 0.5) / 100.0 - 5.5, 1e-4
     slope = scan(tmp_path, "slope", -tilt * x[:, None], (0.01, 1.0))
-    sets = "mesh.flank_nodes=[10, 8]", "mesh.size=8 mm", "contact.grid=[64, 1]"
+    sets = "mesh.flank_nodes=[11, 9]", "mesh.size=8 mm", "contact.grid=[64, 1]"
     joints = [
         dovetail_joint(load_case(PLANE, [*sets, *given])).section().finer_mesh().structure
         for given in ([], [surfaces(intrados={"disk": slope})])
     ]
     bare, scanned = (joint.meshed().interfaces[0] for joint in joints)
-    assert len(scanned) == 2 * (10 - 1) + 1
+    assert len(scanned) == 2 * (11 - 1) + 1
     expected = tilt * scanned.coordinates[:, 0]
     np.testing.assert_allclose(scanned.gap - bare.gap, expected, atol=0.5 * tilt * 1.2 / 8)
 
@@ -67,7 +67,7 @@ def test_edges_from_scans_are_the_edges(tmp_path):
         body: scan(tmp_path, body, -share * edges, (0.01, 1.0))
         for body, share in (("disk", 0.4), ("blade", 0.6))
     }
-    coarse = ["mesh.flank_nodes=[40, 8]", "mesh.size=8 mm", "load_path.increments=[1, 1]"]
+    coarse = ["mesh.flank_nodes=[41, 9]", "mesh.size=8 mm", "load_path.increments=[1, 1]"]
     off = []
     for strips in (64, 128):
         sets = [*coarse, "mesh.order=1", f"contact.grid=[{strips}, 1]"]
@@ -92,7 +92,7 @@ def test_mirrored_scans_have_mirrored_pressures(tmp_path):
     waves = 2e-3 * np.sin(0.9 * x + 0.3) * np.cos(0.27 * y + 0.7) + 1e-5 * y
     waves += 5e-4 * np.random.default_rng(0).standard_normal(x.shape)
     rough = scan(tmp_path, "rough", waves, (0.2, 0.2))
-    coarse = ["mesh.flank_nodes=[6, 8]", "mesh.size=10 mm", "load_path.increments=[1, 1]"]
+    coarse = ["mesh.flank_nodes=[7, 9]", "mesh.size=10 mm", "load_path.increments=[1, 1]"]
     mirrored = surfaces(intrados={"disk": rough}, extrados={"disk": rough | {"flipped": True}})
     (loads, first), (other_loads, other) = solved(SPACE, mirrored, *coarse)
     largest = first.pressure.max()
@@ -111,7 +111,7 @@ def test_planes_are_exact_on_flanks(tmp_path):
     x, y = np.meshgrid((np.arange(70) - 34.5) * 0.2, (np.arange(90) - 44.5) * 0.8, indexing="ij")
     tilted = scan(tmp_path, "tilted", 1e-3 * x - 2e-4 * y, (0.2, 0.8))
     down = scan(tmp_path, "down", 2e-4 * y - 1e-3 * x, (0.2, 0.8))
-    coarse = ["mesh.flank_nodes=[6, 8]", "mesh.size=10 mm", "structure.skew=10 deg"]
+    coarse = ["mesh.flank_nodes=[7, 9]", "mesh.size=10 mm", "structure.skew=10 deg"]
     cancels = {"disk": tilted, "blade": down | {"flipped": True}}
     for body, sign in (("disk", -1.0), ("blade", 1.0)):
         changes = [surfaces(intrados={body: tilted}, extrados=cancels), *coarse]
@@ -156,7 +156,7 @@ def test_a_run_wears_what_was_measured(tmp_path):
     x = (np.arange(600) + 0.5) / 50.0 - 6.0
     ridges = np.repeat(2e-3 * np.cos(2.0 * np.pi * x / 1.5)[:, None], 620, axis=1)
     blade = scan(tmp_path, "ridges", ridges, (0.02, 0.1))
-    coarse = ["mesh.flank_nodes=[8, 8]", "mesh.size=10 mm", "load_path.increments=[2, 2]"]
+    coarse = ["mesh.flank_nodes=[9, 9]", "mesh.size=10 mm", "load_path.increments=[2, 2]"]
     quiet = ["output.figures=false", "stress.section=none", "stress.life.parameter=none"]
     out = tmp_path / "out"
     changes = [surfaces(intrados={"blade": blade}), *coarse, *quiet, "error_budget=known"]

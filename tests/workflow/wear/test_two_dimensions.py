@@ -30,7 +30,7 @@ from workflow.messages.warning_kinds import WarningKind
 from workflow.shell.folders.folder import OutputFolder
 
 # Coarse enough to run in a second; probes have a mesh of their own.
-COARSE = "mesh.flank_nodes=[10, 10]", "mesh.size=8", "contact.grid=[64, 64]"
+COARSE = "mesh.flank_nodes=[11, 11]", "mesh.size=8", "contact.grid=[64, 64]"
 QUIET = "output.paraview=false", "output.figures=false"
 FRICTION = 0.4
 

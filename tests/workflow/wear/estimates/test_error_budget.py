@@ -282,7 +282,7 @@ def test_probe_models_differ_in_one_thing_each(section) -> None:
     assert replace(finer, structure=replace(finer.structure, mesh=own.structure.mesh)) == own
     assert on_grid(other, *own.contacts.grid) == own
     mesh = finer.structure.mesh
-    assert (mesh.flank_nodes[0] - 1, mesh.size, mesh.order) == (2 * 11, 4.0, 2)
+    assert (mesh.flank_nodes[0] - 1, mesh.size, mesh.order) == (2 * 12, 4.0, 2)
     assert other.contacts.grid[0] == 2 * own.contacts.grid[0]
     assert probes.neighbours["grid"].share == pytest.approx(4.0 / 3.0)
 

@@ -40,7 +40,7 @@ from workflow.models.budget.probe_runs import STEPS, Numbers, scales
 # width of the flank. On the default joint, meshes from 6 x 16 to 20 x 34 nodes agree on the
 # differences within 1 % of the values under the pull alone, and within 2 % under the moment, except
 # for slip and energy of the lesser flank, which scatter by 4 %. Fewer rows blur the ends.
-NODES_ACROSS, ROWS_PER_WIDTH = 8, 3
+NODES_ACROSS, ROWS_PER_WIDTH = 9, 3
 DIMENSION = "structure.dimension"
 # Elements across a flank: fewer give no useful estimate, and the largest number takes seconds to
 # condense in the plane. In space the time grows with the fourth power, so the mesh is never made
@@ -107,8 +107,8 @@ def choose_dimension(case: DovetailCase, allowed: float) -> Decision:
 def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
     """Return the mid-slot values of every flank on a coarse mesh."""
     width, length = case.structure.face_width, case.structure.slot_length
-    nodes = NODES_ACROSS, 1 + ceil(ROWS_PER_WIDTH * length / width)
-    coarse = {"flank_nodes": nodes, "size": width, "notch": NOTCH, "order": 1}
+    nodes = NODES_ACROSS, 1 + 2 * ceil(0.5 * ROWS_PER_WIDTH * length / width)
+    coarse = {"flank_nodes": nodes, "size": width, "notch": NOTCH, "order": 2}
     settings = {DIMENSION: dimension, **{f"mesh.{key}": value for key, value in coarse.items()}}
     stage = structure_loads(changed(case, settings), dovetail_joint)
     middles = {}
