@@ -126,7 +126,7 @@ class _Beyond:
         self._same = SAME * size + len(parts) * max(pair.max_distance for pair in cuts)
         body = self._meshed(parts, free)
         wide = ElasticBody(body, elastic.material, elastic.node_order)
-        self.recovery = StressRecovery(wide, body.mesh.boundaries["free"])
+        self.recovery = StressRecovery(wide, body.mesh.boundaries["free"], elastic.order)
         self._sources, self._turns = self._images(wide.nodes, list(parts))
 
     def find(self, vertices: Indices) -> tuple[Indices, Indices]:

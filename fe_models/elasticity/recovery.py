@@ -44,11 +44,22 @@ SMOOTH, EDGE = 0.94, 0.1
 
 
 class StressRecovery:
-    """Recovery of the stress of a body at its vertices; ``free`` are facets without traction."""
+    """Recovery of the stress of a body at its vertices.
 
-    def __init__(self, elastic: ElasticBody, free: Indices) -> None:
+    Parameters
+    ----------
+    elastic
+        The elastic body.
+    free
+        Facets without traction.
+    order
+        Order of the elements whose displacements its nodes have; by default that of its own.
+    """
+
+    def __init__(self, elastic: ElasticBody, free: Indices, order: int | None = None) -> None:
         self._elastic = elastic
         self._free = free
+        self._order = elastic.order if order is None else order
 
     def stress(
         self, displacement: Array, thermal: Array | None = None, vertices: Indices | None = None
@@ -62,7 +73,7 @@ class StressRecovery:
         if vertices is None:
             vertices = np.arange(self._elastic.body.mesh.nvertices)
         patches = self._patches[vertices]
-        return self._of(displacement, vertices, patches, self._elastic.node_order + 1, thermal)
+        return self._of(displacement, vertices, patches, self._order + 1, thermal)
 
     def histories(
         self, displacements: Array, vertices: Indices, thermal: Array | None = None
@@ -76,7 +87,7 @@ class StressRecovery:
         count, d = displacements.shape[1], self._elastic.dimension
         nodes = self._nodes_near(self._patches[vertices])
         values = displacements.reshape(-1, d, count).swapaxes(1, 2).reshape(-1, count * d)
-        slopes = _gradients(elastic.nodes[:, axes], values, vertices, nodes, elastic.node_order + 1)
+        slopes = _gradients(elastic.nodes[:, axes], values, vertices, nodes, self._order + 1)
         stress = np.empty((count, 6, len(vertices)))
         for t, slope in enumerate(slopes.reshape(count, d, d, -1)):
             expansion = 0.0 if thermal is None else thermal[vertices, t]
@@ -90,7 +101,7 @@ class StressRecovery:
         """
         points = self._elastic.nodes[:, list(self._elastic.body.axes)]
         nodes = self._nodes_near(self._patches[vertices])
-        return _gradients(points, values, vertices, nodes, self._elastic.node_order + 1)
+        return _gradients(points, values, vertices, nodes, self._order + 1)
 
     def along_surface(self, vertices: Indices) -> Array:
         """Return the projectors ``(n, 3, 3)`` on the free surface at ``vertices``."""
@@ -105,7 +116,7 @@ class StressRecovery:
         elements of order 1 there is also a fit with a polynomial of one degree less, since their
         displacements are of that order.
         """
-        order, at_vertices = self._elastic.node_order, self._elements_of_vertices
+        order, at_vertices = self._order, self._elements_of_vertices
         reached = self._neighbours[vertices]
         near, wide = ((r @ at_vertices).tocsr() for r in (reached, reached @ self._neighbours))
         found = [self._of(displacement, vertices, wide, order + 1, thermal)]
@@ -171,7 +182,7 @@ class StressRecovery:
         """Elements in the patch of each vertex: two rings, or one inside if it has enough nodes."""
         mesh, near = self._elastic.body.mesh, self._elements_of_vertices
         reached = np.diff((near @ self._nodes_of_elements).tocsr().indptr)
-        coefficients = len(_exponents(mesh.dim(), self._elastic.node_order + 1))
+        coefficients = len(_exponents(mesh.dim(), self._order + 1))
         few = reached < NODES_PER_COEFFICIENT * coefficients
         few[mesh.boundary_nodes()] = True
         wide = sp.diags(few.astype(float)) @ self._neighbours

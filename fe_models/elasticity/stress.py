@@ -320,7 +320,7 @@ def stress_field(
         apart = [
             (von_mises(s)[0] - values_at[0], maximum_principal(s)[1] - values_at[1]) for s in others
         ]
-        change = MISSING[elastic.node_order] * np.abs(apart).max(axis=0)
+        change = MISSING[elastic.order] * np.abs(apart).max(axis=0)
         # Under compression the largest principal stress is nearly zero, so do not divide by it.
         size = np.maximum(np.abs(values_at), values_at[0])
         error = np.divide(change, size, out=np.zeros(2), where=size > 0.0)

@@ -9,6 +9,7 @@ from fe_models.joints.friction import FrictionalJoint
 from fe_models.joints.joint import join
 from fe_models.joints.mortar import mortar_interface
 from fe_models.loads.constraints import Constraints
+from fe_models.meshes.halving import halved
 from fe_models.meshes.structure_mesh import AXES, Body
 from fe_models.meshes.trace import LinearTrace
 from fe_models.supported_body import SupportedBody, interface_nodes
@@ -17,6 +18,8 @@ from sa_solver.types import Frame, Material
 LINE, SURFACE = 2, 3
 DIMENSIONS = [LINE, SURFACE]
 ORDERS = [1, 2]
+# Elements of second order all of whose nodes are vertices of the body.
+HALVED = "halved"
 STEEL, TITANIUM = Material(200e3, 0.3), Material(115e3, 0.3)
 # Error of the forces due to the friction solver; the projection is exact to rounding.
 SOLVER = 1e-6
@@ -43,7 +46,14 @@ def block(counts, low, high, material, order, shake, seed):
         for end, value in enumerate((low[axis], high[axis]))
     }
     mesh = type(mesh)(points, mesh.t).with_boundaries(faces)
-    return ElasticBody(Body("block", mesh), material, order)
+    return of_kind(Body("block", mesh), material, order)
+
+
+def of_kind(body, material, order):
+    """Return the elastic body with elements of an ``order``, or of second order and halved."""
+    if order == HALVED:
+        return ElasticBody(halved(body), material, 2)
+    return ElasticBody(body, material, order)
 
 
 def isostatic(elastic):

@@ -1,5 +1,7 @@
 """Hertz's contacts of finite element bodies, with the convergence rates of their meshes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -15,12 +17,12 @@ from sa_solver.reference.subsurface import cylinder_stress, point_force_stress, 
 from tests.fe_models.elasticity.test_verification import (
     AXES,
     MATERIAL,
-    ORDERS,
     OUTWARD,
     held_still,
     tensor_mesh,
     traction_forces,
 )
+from tests.fe_models.joints.pressed_blocks import HALVED, of_kind
 
 
 class HertzPair:
@@ -38,7 +40,7 @@ class HertzPair:
     GATHERED = 2.0
 
     def __init__(self, dimension, order, cells):
-        """Build blocks with ``cells`` across and half as many in depth."""
+        """Build blocks with ``cells`` between nodes across and half as many in depth."""
         self.cell = 2.0 * self.SIZE / cells * self.GATHERED / np.sinh(self.GATHERED)
         self.dimension, self.order = dimension, order
         modulus = MATERIAL.young / (2.0 * (1.0 - MATERIAL.poisson**2))
@@ -55,6 +57,7 @@ class HertzPair:
 
     def _block(self, cells, side):
         """Return the lower block, or its mirror image, so that the two faces match."""
+        cells //= 2 if self.order == HALVED else 1
         spread = np.sinh(np.linspace(-1.0, 1.0, cells + 1) * self.GATHERED)
         across = self.SIZE * spread / spread[-1]
         across[cells // 2] = 0.0
@@ -66,7 +69,7 @@ class HertzPair:
         points = mesh.p.copy()
         points[-1] *= -side
         mirrored = type(mesh)(points, mesh.t).with_boundaries(boundaries)
-        return ElasticBody(Body("block", mirrored), MATERIAL, self.order)
+        return of_kind(Body("block", mirrored), MATERIAL, self.order)
 
     def _far_load(self, elastic, side):
         """Return the tractions on the cut faces; z0 is the far one of both blocks."""
@@ -173,7 +176,7 @@ class HertzPair:
         return u.reshape(-1, self.dimension)[node, -1]
 
     def _areas(self):
-        linear = ElasticBody(self.lower.body, MATERIAL, 1)
+        linear = ElasticBody(replace(self.lower.body, elements=None), MATERIAL, 1)
         nodes, weights = linear.boundary_weights("contact")
         return weights[np.searchsorted(nodes, self.nodes)]
 
@@ -181,6 +184,9 @@ class HertzPair:
 # Errors of approach, half-width, peak and pressure are at most these times the powers of the cell
 # at the contact over its half-width.
 HERTZ_BOUNDS = {2: [0.8, 0.8, 0.25, 0.45], 3: [1.0, 0.8, 0.6, 0.65]}
+# Halved elements of second order: on the same nodes the approach is five times as accurate, and
+# vertices and midside nodes have pressures that are off in opposite directions.
+HALVED_BOUNDS = {2: [0.2, 0.8, 0.8, 0.45], 3: [0.2, 0.8, 1.8, 1.0]}
 HERTZ_RATES = [2.0, 2.0, 2.0, 1.0]
 
 
@@ -192,26 +198,28 @@ def check_hertz(dimension, cells):
     infinite slope within a cell, which gives h in L2.
     """
     approach = {}
-    for order in ORDERS:
+    for order in cells:
         for count in cells[order]:
             pair = HertzPair(dimension, order, count)
             deviations = pair.solve()
-            limit = np.array(HERTZ_BOUNDS[dimension]) * pair.cell ** np.array(HERTZ_RATES)
+            bounds = (HALVED_BOUNDS if order == HALVED else HERTZ_BOUNDS)[dimension]
+            limit = np.array(bounds) * pair.cell ** np.array(HERTZ_RATES)
             assert np.all(deviations < limit), (order, count, deviations, limit)
             approach[order, count] = deviations[0]
-    for count in set(cells[1]) & set(cells[2]):
-        assert approach[2, count] < 0.5 * approach[1, count]
+    for order in cells.keys() - {1}:
+        for count in set(cells[1]) & set(cells[order]):
+            assert approach[order, count] < 0.5 * approach[1, count]
 
 
 def test_hertz_line():
-    check_hertz(2, {1: (12, 24, 48), 2: (12, 24, 48)})
+    check_hertz(2, {1: (12, 24, 48), 2: (12, 24, 48), HALVED: (12, 24, 48)})
 
 
 @pytest.mark.slow
 def test_hertz_line_on_fine_meshes():
-    check_hertz(2, {1: (96, 192), 2: (96, 192)})
+    check_hertz(2, {1: (96, 192), 2: (96, 192), HALVED: (96, 192)})
 
 
 @pytest.mark.slow
 def test_hertz_sphere():
-    check_hertz(3, {1: (8, 16, 24), 2: (8, 12)})
+    check_hertz(3, {1: (8, 16, 24), 2: (8, 12), HALVED: (8, 16, 24)})
