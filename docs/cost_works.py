@@ -177,7 +177,8 @@ def _stack(bodies: int) -> Structure:
 
 def _dovetail(nodes: int) -> StructureLoads:
     along = round(nodes * FLANK[1] / FLANK[0])
-    case: Any = load_case(CASES / "dovetail.yaml", [f"mesh.flank_nodes=[{nodes}, {along}]"])
+    mesh = f"mesh={{flank_nodes: [{nodes}, {along}], size: 5 mm, notch: 48, order: 1}}"
+    case: Any = load_case(CASES / "dovetail.yaml", [mesh])
     return structure_loads(case, dovetail_joint)
 
 

@@ -55,7 +55,7 @@ Result = TypeVar("Result")
 REQUIRED = 0.01
 # Mesh sizes for each order of elements; the default order is last, and its finest mesh is the
 # reference for all.
-NODES = {1: (11, 21, 40, 79, 157, 313), 2: (11, 21, 40, 79, 157, 313)}
+NODES = {1: (11, 21, 41, 81, 161, 321), 2: (11, 21, 41, 81, 161, 321)}
 ELEMENTS = {1: (6, 10, 14, 20), 2: (6, 10, 14)}
 DEFAULT_ORDER = 2
 # Increments of each leg, those of the reference, and values of `contact.accuracy`.
@@ -73,7 +73,7 @@ def structure() -> Ladder:
     axis = Approximation(
         "structure", "nodes across a flank of the dovetail's section", _nothing, order=2.0
     )
-    return judge(axis, _meshes("dovetail_2d", "nodes", NODES, 40, _mission), {}, {})
+    return judge(axis, _meshes("dovetail_2d", "nodes", NODES, 41, _mission), {}, {})
 
 
 def _mission(case: Any) -> dict[str, float]:
@@ -243,9 +243,11 @@ def _on_mesh(name: str, order: int, finer: float) -> Any:
         "order": order,
         "size": case.mesh.size / finer,
     }
-    for entry in ("flank_nodes", "pad_elements"):
-        if entry in mesh:
-            mesh[entry] = (finer * np.array(mesh[entry])).round().astype(int).tolist()
+    if "flank_nodes" in mesh:  # odd numbers make elements of either order
+        halves = np.floor(0.5 * finer * np.array(mesh["flank_nodes"]))
+        mesh["flank_nodes"] = (2 * halves + 1).astype(int).tolist()
+    if "pad_elements" in mesh:
+        mesh["pad_elements"] = round(finer * mesh["pad_elements"])
     return load_case(ROOT / "cases" / f"{name}.yaml", [f"mesh={json.dumps(mesh)}"])
 
 

@@ -10,6 +10,10 @@ u (least squares), and the forces that do work on it are f_i = ∫ φ_i t dA. Th
 these forces at the vertices are those of the tractions, and rigid motions and linear fields are
 their own trace.
 
+The vertices may be those of the facets, or of their halves and quarters: then every node of the
+elements is in contact (:func:`fe_models.meshes.halving.halved`). A pressure that changes within an
+element is off in opposite directions at the corners of elements and in the middle of their edges.
+
 The alternative, to keep a face linear by holding midside nodes between their vertices, makes the
 elements behind the face no better than those of first order: under a Hertzian pressure on ten of
 them the deflection of the face has an error of 1.7 %, with this trace 0.1 % (under a uniform

@@ -58,7 +58,7 @@ def test_a_case_with_every_default_written_out_takes_none(dovetail_path: Path) -
     case = load_case(dovetail_path, ["mesh={size: 6 mm}", "wear.step={}"])
     ((name, text),) = taken(case)
     assert name == "defaults"
-    for entry in ("mesh.order 1", "wear.step.kind implicit", "accuracy 0.05"):
+    for entry in ("mesh.order 2", "wear.step.kind implicit", "accuracy 0.05"):
         assert entry in text.split(", ")
     assert "mesh.size" not in text
     assert "loops" not in text  # there are none

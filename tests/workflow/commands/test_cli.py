@@ -64,7 +64,7 @@ def test_check_prints_the_grid_and_the_increments(dovetail_path):
 
 def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
     """Both flanks condensed onto 90,000 degrees of freedom need 400 GB of dense matrices."""
-    result = invoke("check", dovetail_path, "--set", "mesh.flank_nodes=[100, 150]")
+    result = invoke("check", dovetail_path, "--set", "mesh.flank_nodes=[101, 151]")
     assert result.exit_code == 4
     assert "mesh.flank_nodes" in result.stderr
     assert "OK" not in result.stdout

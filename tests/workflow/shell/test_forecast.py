@@ -147,7 +147,7 @@ def test_the_estimated_run_time_has_the_right_order_of_magnitude(name: str, true
 @pytest.mark.parametrize(
     ("name", "finer"),
     [
-        ("dovetail", "mesh.flank_nodes=[40, 68]"),
+        ("dovetail", "mesh.flank_nodes=[41, 45]"),
         ("dovetail", "wear.step.cycles=2000"),
         ("dovetail", "contact.grid=[512, 1024]"),
         ("cylinder_wear", "wear.step.cycles=100"),
