@@ -34,9 +34,9 @@ from sa_solver.types import Array, Frame
 # pressure is sensitive to the former; the latter affects only the stress at the fillets.
 SIZE_GROWTH, FILLET_GROWTH = {1: 0.25, 2: 0.5}, 0.7
 # Layers of elements along the slot mix even ones with ones that grow from the ends as
-# a cosine does, with this share: they are 0.6 times as long as the mean there, in the middle 1.2
+# a cosine does, with this share: they are 0.55 times as long as the mean there, in the middle 1.26
 # times. Pressure and slip change near the ends.
-END_GRADING = 0.4
+END_GRADING = 0.45
 # Number of points along a curve from which distances are measured: many more than it usually has
 # nodes.
 SAMPLES = 200

@@ -66,7 +66,7 @@ class DovetailMesh:
     24
     """
 
-    flank_nodes: tuple[int, int] = (21, 23)
+    flank_nodes: tuple[int, int] = (21, 27)
     size: float = 8.0
     notch: int = 24
     order: Literal[1, 2] = 2

@@ -314,7 +314,7 @@ class Mesh(Section):
     """Tetrahedra of the structure."""
 
     flank_nodes: tuple[FlankNodes, FlankNodes] = entry(
-        "number of nodes across the flank, along the slot", [21, 23], default=(21, 23)
+        "number of nodes across the flank, along the slot", [21, 27], default=(21, 27)
     )
     size: Length = entry("distance of the nodes away from the flanks [mm]", "8 mm", default=8.0)
     notch: Annotated[int, Whole(8, 1000)] = entry(
