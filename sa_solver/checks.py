@@ -8,6 +8,7 @@ numbers, and fail far from the cause where a list or a single number is given in
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from operator import index
 from types import NoneType
 from typing import Any, Literal, get_args
@@ -19,6 +20,9 @@ from sa_solver.errors import FretscaleError, InputError
 
 REAL = "fiu"
 """Kinds of numpy data types that hold real numbers: floats, signed and unsigned integers."""
+
+FLOATS = (float, np.float64)
+"""Types of most numbers, which need no further look: a masked array of them takes far longer."""
 
 Shape = Sequence[int | None]
 
@@ -65,7 +69,7 @@ def array(
     found: NDArray[np.float64] = np.asarray(plain, dtype=np.float64, order=order)
     if shape is not None and not _fits(shape, found.shape):
         raise error(f"{name} have shape {found.shape}: give {_shown(shape, found.shape)}")
-    if finite and not np.all(np.isfinite(found) | (infinite & (found == np.inf))):
+    if finite and not _all_finite(found, infinite):
         bad = "NaN or -infinity" if infinite else "NaN or infinity"
         raise error(f"{name} hold {bad}: give finite numbers, or fill or crop what is missing")
     return found
@@ -102,12 +106,14 @@ def number(
     The bounds are ``above`` (exclusive), ``least`` and ``most`` (both inclusive). The number must
     be finite; ``infinite`` also allows +infinity. ``name`` is the name of the value in messages.
     """
-    plain: Any = np.ma.asanyarray(value)
-    if plain.ndim or np.ma.getmaskarray(plain).any() or plain.dtype.kind not in REAL:
-        raise error(f"{name} is {shown(value)}: give one real number")
+    plain: Any = value
+    if type(value) not in FLOATS:
+        plain = np.ma.asanyarray(value)
+        if plain.ndim or np.ma.getmaskarray(plain).any() or plain.dtype.kind not in REAL:
+            raise error(f"{name} is {shown(value)}: give one real number")
     found = float(plain)
     inside = found > above and least <= found <= most
-    if not (inside and (np.isfinite(found) or (infinite and found == np.inf))):
+    if not (inside and (isfinite(found) or (infinite and found == np.inf))):
         bounds = [f"above {above:g}"] if above > -np.inf else []
         bounds += [f"of {least:g} or more"] if least > -np.inf else []
         bounds += [f"of {most:g} or less"] if most < np.inf else []
@@ -252,6 +258,8 @@ def _without_mask(
 
     Masked values are replaced by ``masked``, or raise ``error`` if that is None.
     """
+    if type(values) in FLOATS:
+        return np.asarray(values)
     try:
         # Lists may hold masked arrays, whose masks np.asarray would lose.
         found: Any = np.ma.asanyarray(values)
@@ -266,6 +274,12 @@ def _without_mask(
             "leave these places out"
         )
     return np.asarray(found.astype(np.float64).filled(masked))
+
+
+def _all_finite(found: NDArray[np.float64], infinite: bool) -> bool:
+    """Return whether all values are finite, or +infinity where ``infinite`` allows it."""
+    finite = np.isfinite(found)
+    return bool(finite.all() or (infinite and (finite | (found == np.inf)).all()))
 
 
 def _fits(shape: Shape, given: tuple[int, ...]) -> bool:

@@ -264,9 +264,14 @@ class ElasticBody:
 
     def boundary_integral(self, boundary: str, integrand: Callable[[Array], Array]) -> float:
         """Return the integral over a named boundary of a function of points ``(3, ...)``."""
+        points, areas = self.boundary_points(boundary)
+        return float(np.sum(integrand(points) * areas))
+
+    def boundary_points(self, boundary: str) -> tuple[Array, Array]:
+        """Return integration points ``(3, p)`` [mm] of a named boundary and their areas."""
         basis = self._facet_basis(boundary)
         points = _spatial(np.asarray(basis.global_coordinates()))
-        return float(np.sum(integrand(points) * basis.dx))
+        return points.reshape(3, -1), np.asarray(basis.dx).ravel()
 
     def boundary_weights(self, boundary: str) -> tuple[Indices, Array]:
         """Return the nodes of a boundary and the area of each, so that Σ w u = ∫ u dA."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -189,30 +189,11 @@ def turning_of(load: AppliedLoad) -> Array | None:
 
 def _moments(elastic: ElasticBody, boundary: str) -> tuple[float, Array, Array]:
     """Return a boundary's area, centroid ``(3,)`` and second moments about it ``(3, 3)``."""
-    axes = range(3)
-    area = elastic.boundary_integral(boundary, _product(np.zeros(3), ()))
-    first = [elastic.boundary_integral(boundary, _product(np.zeros(3), (i,))) for i in axes]
-    centroid = np.array(first) / area
-    second = [
-        [elastic.boundary_integral(boundary, _product(centroid, (i, j))) for j in axes]
-        for i in axes
-    ]
-    return area, centroid, np.array(second)
-
-
-def _product(origin: Array, axes: Sequence[int]) -> Callable[[Array], Array]:
-    """Return a function that multiplies the coordinates of points ``(3, ...)`` along ``axes``.
-
-    The coordinates are relative to ``origin``.
-    """
-
-    def product(points: Array) -> Array:
-        value = np.ones_like(points[0])
-        for axis in axes:
-            value = value * (points[axis] - origin[axis])
-        return value
-
-    return product
+    points, areas = elastic.boundary_points(boundary)
+    area = float(areas.sum())
+    centroid = points @ areas / area
+    arms = points - centroid[:, None]
+    return area, centroid, (arms * areas) @ arms.T
 
 
 def _linear(constant: float, slope: Array, origin: Array) -> Callable[[Array], Array]:

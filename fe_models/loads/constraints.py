@@ -228,7 +228,9 @@ class Constraints:
         Those of nodes, below ``size``, are followed by combinations of them (:meth:`no_work`,
         :meth:`follow`).
         """
-        return np.setdiff1d(np.arange(self._total), np.fromiter(self._eliminated, np.int64))
+        kept = np.ones(self._total, bool)
+        kept[list(self._eliminated)] = False
+        return np.flatnonzero(kept)
 
     @property
     def supported(self) -> Indices:
@@ -247,7 +249,7 @@ class Constraints:
 
     def transformation(self) -> sp.csr_matrix:
         """Return T, ``(displacements, free)``, with chains of eliminated displacements resolved."""
-        slaves = np.setdiff1d(np.arange(self._total), self.free)
+        free, slaves = self.free, np.array(sorted(self._eliminated), np.int64)
         entries = [self._eliminated[dof] for dof in slaves.tolist()]
         counts = [len(masters) for masters, _ in entries]
         columns = np.concatenate([m for m, _ in entries]) if entries else np.empty(0, np.int64)
@@ -255,10 +257,10 @@ class Constraints:
         shape = (self._total, self._total)
         relation = sp.csr_matrix((values, (np.repeat(slaves, counts), columns)), shape=shape)
         kept = np.zeros(self._total)
-        kept[self.free] = 1.0
+        kept[free] = 1.0
         step = sp.diags(kept) + relation
         transformation = step
         while len(transformation[:, slaves].data):
             transformation = (transformation @ step).tocsr()
             transformation.eliminate_zeros()
-        return transformation[: self._size, self.free].tocsr()
+        return transformation[: self._size, free].tocsr()

@@ -5,6 +5,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
+from tests.workflow.command_line import runs_here
 from workflow.cli import cli
 
 CASE = """\
@@ -51,7 +52,8 @@ def run(folder, loads, *overrides):
     case = folder / "case.yaml"
     case.write_text(CASE, encoding="utf-8")
     settings = [part for entry in overrides for part in ("--set", entry)]
-    done = CliRunner().invoke(cli, ["run", str(case), "--out", str(folder / "out"), *settings])
+    with runs_here():
+        done = CliRunner().invoke(cli, ["run", str(case), "--out", str(folder / "out"), *settings])
     assert done.exit_code == 0, done.stderr
     text = (folder / "out" / "summary.json").read_text("utf-8")
     assert "NaN" not in text

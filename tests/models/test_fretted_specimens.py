@@ -20,7 +20,8 @@ STEEL = Material(200e3, 0.3, density=7.8e-9)
 @pytest.fixture(scope="module")
 def model():
     """Return coarse flat specimens under 60 N, of which body 2 wears three times as fast."""
-    pair = fretscale.SpecimenPair(Specimen(pad_elements=4), (STEEL, STEEL), size=4.0, modes=2)
+    coarse = {"size": 4.0, "order": 1, "modes": 2}
+    pair = fretscale.SpecimenPair(Specimen(pad_elements=4), (STEEL, STEEL), **coarse)
     laws = EnergyLaw(1.5e-9), EnergyLaw(4.5e-9)
     return fretscale.FrettedSpecimens(pair, FrettingConditions(60.0, 0.014, 0.88), laws, cycles=1e4)
 
@@ -30,7 +31,7 @@ def test_a_model_wears_as_its_case(tmp_path, monkeypatch):
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
     case = fretscale.load_case(
         CASES / "specimens_coarse.yaml",
-        mesh={"pad_elements": 4, "size": "4 mm"},
+        mesh={"pad_elements": 4, "size": "4 mm", "order": 1},
         reduction__modes=2,
         contact__grid=[16, 16],
         wear__cycles=1e4,

@@ -9,6 +9,7 @@ import pytest
 
 from fe_models.geometry import Specimen
 from sa_solver import InputError, LoadHistory, Material
+from tests.marks import slow
 from wear import ArchardLaw, CycleLoads, EnergyLaw
 from wear.evolution import CoulombFriction, EnergyTable
 from workflow.messages.warning_kinds import WarningKind
@@ -143,7 +144,7 @@ def test_friction_that_falls_within_a_cycle_is_warned_of(last):
         model(of=contact(grid=(16, 16), friction=falling)).run()
 
 
-@pytest.mark.parametrize("last", [0.5, 0.0])
+@pytest.mark.parametrize("last", [0.5, slow(0.0)])
 def test_friction_that_falls_within_a_jump_is_followed(last):
     """With e' = µ(e) P s: e = (1 - exp(-k N)) / c until the table ends, and a straight line then.
 

@@ -73,8 +73,8 @@ def names_asked_for(module: ast.Module) -> Iterator[tuple[int, str]]:
     """Yield line and name of every class in an isinstance check or a comparison of types."""
     for node in ast.walk(module):
         asked: ast.AST | None = None
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("isinstance", "issubclass"):
-            asked = node.args[1]
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            asked = node.args[1] if node.func.id in ("isinstance", "issubclass") else None
         elif isinstance(node, ast.MatchClass):
             asked = node.cls
         elif isinstance(node, ast.Compare) and ast.unparse(node.left).startswith("type("):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -107,5 +108,14 @@ class HarmonicSolution:
 
 def _in_time(amplitudes: ComplexArray, resolution: Resolution, samples: int) -> Array:
     """Return Re Σ a_k exp(ikωt) ``(t, n)`` at equally spaced times of a period."""
-    turns = np.outer(np.arange(samples), resolution.harmonics) % samples / samples
-    return np.asarray((np.exp(2j * np.pi * turns) @ amplitudes).real)
+    return np.asarray((_waves(resolution.harmonics, samples) @ amplitudes).real)
+
+
+# All motions of a curve mostly share one table, which takes longer to compute than to apply.
+@lru_cache(maxsize=2)
+def _waves(harmonics: tuple[int, ...], samples: int) -> ComplexArray:
+    """Return exp(ikωt) ``(t, k)`` of harmonics at equally spaced times of a period."""
+    turns = np.outer(np.arange(samples), harmonics) % samples / samples
+    waves: ComplexArray = np.exp(2j * np.pi * turns)
+    waves.flags.writeable = False
+    return waves

@@ -146,7 +146,7 @@ def turned(steps):
 
 def test_increments_of_a_load_that_turns_are_split_as_accuracy_asks():
     """Backward steps and their error estimate are of first order."""
-    half_space, height = ball(0.3, 12)
+    half_space, height = ball(0.3, 8)
     given, rough, finest = (
         march_history(half_space, height, turned(2), FRICTION, **settings)
         for settings in ({"history": "full"}, {"accuracy": 0.03}, {"accuracy": 0.005})
@@ -200,7 +200,7 @@ def test_energy_has_an_error_of_its_own(values, parts, within):
 def test_dissimilar_bodies_pressed_in_one_increment_stick_as_under_a_growing_load(friction):
     """Spence 1968: c/a of any profile is that of a flat strip, which needs no refinement."""
     pair = ElasticPair(Material(np.inf, 0.3), Material(115e3, 0.0))
-    grid = Grid.line_contact(2.0, 200)
+    grid = Grid.line_contact(2.0, 128)
     pressed = ContactLoadPath(np.array([[LOAD, 0.0, 0.0, 0.0, 0.0, 0.0]]))
 
     def stick_share(height, history="auto"):
@@ -224,7 +224,7 @@ def test_dissimilar_bodies_pressed_in_one_increment_stick_as_under_a_growing_loa
 
 def test_pressing_and_shearing_at_once_is_not_pressing_first():
     """Proportional loads below µ stick everywhere; if P comes first, µP is reached at the rim."""
-    half_space, height = ball(0.0, 24)
+    half_space, height = ball(0.0, 16)
     marched = march_history(half_space, height, path([0.5], press=1), FRICTION)
     assert marched.method == "reversals"
     together = ContactLoadPath(np.array([[LOAD, 0.5 * SLIDING, 0.0, 0.0, 0.0, 0.0]]))

@@ -10,6 +10,7 @@ from sa_solver.cycles.partial_slip import partial_slip_curve
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
+from tests.marks import slow
 from tests.oracles.sliding_cylinder import wear_without_tilt
 from tests.wear.contact import contacts
 from tests.wear.contact.contacts import BODY, COEFFICIENT, FRICTION, PAIR, STEEL
@@ -181,7 +182,7 @@ def in_a_model_of_its_own(
 
 STEPPERS = {
     "explicit": (ExplicitStepper(0.9), 1),
-    "implicit": (ImplicitStepper(), 40),
+    "implicit": slow(ImplicitStepper(), 40),
     "second order": (SecondOrderStepper(), 12),
 }
 
@@ -204,7 +205,7 @@ def test_a_sliding_cylinder_wears_as_in_a_model_of_its_own(stepper, jumps: int) 
         assert depth.max() == pytest.approx(own.max(), rel=4e-3)
 
 
-@pytest.mark.parametrize("kind", [ImplicitStepper, SecondOrderStepper])
+@pytest.mark.parametrize("kind", [slow(ImplicitStepper), SecondOrderStepper])
 def test_the_error_of_steps_of_moving_surfaces_is_estimated(kind) -> None:
     """The estimated error of either depth is within a factor of three, and near the tolerance."""
     grid, load, each_way, cells, cycles = Grid.line_contact(0.72, 72), 18.5, 2, 6, 1e4

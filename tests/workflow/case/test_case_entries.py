@@ -177,6 +177,7 @@ def stated(leaf):
     return [*BESIDE.get(leaf.key, ()), plain]
 
 
+@pytest.mark.usefixtures("reads_here")
 @each_section
 def test_example_is_accepted(entries, folders):
     for leaf in entries:

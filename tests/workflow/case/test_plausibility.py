@@ -24,6 +24,7 @@ CASES = sorted([*Path("cases").glob("*.yaml"), *Path("cases/validation").glob("*
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+@pytest.mark.usefixtures("reads_here")
 def test_shipped_cases_give_no_warnings(path: Path) -> None:
     assert list(plausibility_warnings_of(load_case(path))) == []
 

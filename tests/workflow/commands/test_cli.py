@@ -49,6 +49,7 @@ print("\\nIMPORTED", *({{name.partition(".")[0] for name in set(sys.modules) - b
     sorted([*CASES.glob("*.yaml"), *CASES.glob("validation/*.yaml")]),
     ids=lambda path: path.stem,
 )
+@pytest.mark.usefixtures("reads_here")
 def test_cases_of_the_repository_check(path):
     result = invoke("check", path)
     assert (result.exit_code, result.stderr) == (0, "")

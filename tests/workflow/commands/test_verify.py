@@ -95,6 +95,7 @@ def test_table_has_the_units_of_the_case_and_the_kind_of_each_value(
     assert shown["sign"][:7] == ["-1", "-1", "-", "0.00%", "met", "closed", "form"]
 
 
+@pytest.mark.usefixtures("reads_here")
 def test_every_case_has_expectations():
     """The only exception is a case that provides the bodies of another one."""
     without = {path.stem for path in CASES.glob("*.yaml") if not load_case(path).expect}

@@ -9,7 +9,7 @@ import pytest
 from fe_models.geometry.imported import read_bodies
 from tests.marks import slow
 from tests.workflow.command_line import invoke
-from tests.workflow.conftest import Run, manifest_has_all
+from tests.workflow.conftest import Run, made_once, manifest_has_all
 from tests.workflow.scenes import ROLLER_LOADS, ROLLER_WEAR
 from workflow.kinds import load_case
 from workflow.messages.warning_kinds import WarningKind, kinds_in
@@ -311,8 +311,10 @@ def test_warnings(start, tmp_path, overrides, kinds):
 
 
 @pytest.mark.parametrize("figures", ["false", slow("true")])
-def test_without_friction_nothing_wears(start, tmp_path, figures):
-    run = start(tmp_path / "out", "friction.coefficient=0", *QUICK, f"output.figures={figures}")
+def test_without_friction_nothing_wears(start_without_notches, tmp_path, figures):
+    run = start_without_notches(
+        tmp_path / "out", "friction.coefficient=0", *QUICK, f"output.figures={figures}"
+    )
     assert run.ending.exit_code == 0, run.ending.stderr
     flank = run.summary["intrados"]
     assert (flank["energy"], flank["depth_1"], flank["volume_2"]) == (0.0, 0.0, 0.0)
@@ -371,9 +373,11 @@ def test_too_little_memory_ends_before_anything_is_done(start, monkeypatch, tmp_
 
 
 @pytest.fixture(scope="module")
-def full(start, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("full") / "run"
-    return start(folder, *QUICK, "contact.method=full")
+def full(start_without_notches, tmp_path_factory):
+    def make(folder):
+        return start_without_notches(folder, *QUICK, "contact.method=full")
+
+    return made_once(tmp_path_factory, "full", make)
 
 
 def test_volumes_and_energies_agree(full):

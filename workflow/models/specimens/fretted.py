@@ -84,7 +84,7 @@ class FrettedSpecimens:
     >>> from sa_solver import Material
     >>> from wear import EnergyLaw
     >>> steel, law = Material(200e3, 0.3, density=7.8e-9), EnergyLaw(1.5e-9)
-    >>> pair = fretscale.SpecimenPair(Specimen(pad_elements=4), (steel, steel), size=4.0)
+    >>> pair = fretscale.SpecimenPair(Specimen(pad_elements=4), (steel, steel), size=4.0, order=1)
     >>> conditions = FrettingConditions(force=60.0, stroke=0.014, friction=0.88)
     >>> worn = fretscale.FrettedSpecimens(pair, conditions, (law, law), cycles=1e4).run()
     >>> energy, volume = (float(worn[name][-1]) for name in ("energy", "volume_1"))

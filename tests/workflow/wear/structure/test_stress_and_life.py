@@ -46,21 +46,21 @@ def begin(start: Any, folder: Path, *overrides: str) -> Any:
 
 
 @pytest.fixture(scope="module")
-def normal(start: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def normal(start_without_notches: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Return a run whose slips are the structure's."""
-    return begin(start, tmp_path_factory.mktemp("normal"))
+    return begin(start_without_notches, tmp_path_factory.mktemp("normal"))
 
 
 @pytest.fixture(scope="module")
-def full(start: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def full(start_without_notches: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Return a run with friction of the half-space."""
-    return begin(start, tmp_path_factory.mktemp("full"), "contact.method=full")
+    return begin(start_without_notches, tmp_path_factory.mktemp("full"), "contact.method=full")
 
 
 @pytest.fixture(scope="module")
-def line(start: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def line(start_without_notches: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Return a run in plane strain."""
-    return begin(start, tmp_path_factory.mktemp("line"), "structure.dimension=2")
+    return begin(start_without_notches, tmp_path_factory.mktemp("line"), "structure.dimension=2")
 
 
 def peak_traction(file: h5py.File, flank: str, moment: str) -> Array:
