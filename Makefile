@@ -20,7 +20,7 @@ run: $(INSTALLED)
 	$(BIN)/fretscale run cases/dovetail.yaml --out out/dovetail --force
 
 test: $(TESTABLE)
-	@echo 'fretscale: style, types and layers, then the tests: about 6 minutes on two cores.'
+	@echo 'fretscale: style, types and layers, then the tests: about 5 minutes on two cores.'
 	@$(MAKE) --no-print-directory lint
 	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
