@@ -20,6 +20,7 @@ from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from tests.fe_models.dynamics.curves.test_phase_resonance import block_problem
 from tests.fe_models.dynamics.harmonic_rigs import KT, LOAD, MU, REACH, balance, rig
+from tests.marks import slow
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from wear.joints.elastic import PolynomialSpring
 from wear.joints.jenkins import Jenkins
@@ -68,7 +69,7 @@ def fed_back(problem, motion, ratio):
     return energy_lost(problem, motion) / (2.0 * np.pi * angular**2 * square)
 
 
-@pytest.mark.parametrize("case", ["rig", "block"])
+@pytest.mark.parametrize("case", ["rig", slow("block")])
 def test_damping_is_the_energy_lost(case):
     """Several harmonics, one and three directions, and a constant load are included."""
     if case == "rig":
