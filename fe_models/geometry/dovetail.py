@@ -32,7 +32,7 @@ from sa_solver.types import Array, Frame
 
 # Growth of the mesh size per distance from the flanks, by order, and from the fillets. The contact
 # pressure is sensitive to the former; the latter affects only the stress at the fillets.
-SIZE_GROWTH, FILLET_GROWTH = {1: 0.25, 2: 0.5}, 0.7
+SIZE_GROWTH, FILLET_GROWTH = {1: 0.25, 2: 0.8}, 0.7
 # Layers of elements along the slot mix even ones with ones that grow from the ends as
 # a cosine does, with this share: they are 0.55 times as long as the mean there, in the middle 1.26
 # times. Pressure and slip change near the ends.

@@ -61,14 +61,14 @@ class DovetailMesh:
     Examples
     --------
     >>> import fretscale
-    >>> fine = fretscale.DovetailMesh(flank_nodes=(41, 45), size=4.0)
+    >>> fine = fretscale.DovetailMesh(flank_nodes=(41, 45), size=6.0)
     >>> print(fine.notch)
-    24
+    16
     """
 
     flank_nodes: tuple[int, int] = (21, 27)
-    size: float = 8.0
-    notch: int = 24
+    size: float = 12.0
+    notch: int = 16
     order: Literal[1, 2] = 2
 
     def __post_init__(self) -> None:

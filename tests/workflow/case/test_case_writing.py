@@ -37,7 +37,7 @@ def test_dump_has_every_default(dovetail_path, dovetail_text):
     start = dovetail_text.index("mesh:")
     short = dovetail_text[:start] + dovetail_text[dovetail_text.index("wear:") :]
     written = YAML(typ="safe").load(dump_case(parse_case(short, "short")))
-    assert written["mesh"] == {"flank_nodes": [21, 27], "size": 8.0, "notch": 24, "order": 2}
+    assert written["mesh"] == {"flank_nodes": [21, 27], "size": 12.0, "notch": 16, "order": 2}
     assert written["contact"] == {
         "grid": [128, 256],
         "method": "normal",

@@ -92,15 +92,19 @@ class ContactErrors:
         return isinstance(self.source, BodyPairSource)
 
     def link(self) -> ErrorByResult | None:
-        """Return the difference of energies, and the error of the fit."""
+        """Return the mean difference of energies, unworn and worn, and the error of the fit."""
         if self.half_spaces or self.settings.method == "nodes":
             return None
         link = self.contact.first.link
         if not link.corrects:
             return self._from_probes("link", WORN | PRESSURES)
-        structural = self.contact.unworn.loads.mean_energy
-        on_grid = float(self.contact.first.energy.sum())
-        apart = (on_grid - structural) / structural if structural > 0.0 else 0.0
+        unworn, end = self.contact.unworn.loads, self.contact.end
+        worn = float(end.rubbed.sum()) * self.contact.stage.grid.cell_area
+        # The difference changes as edges wear, so its mean over the run is that of both ends.
+        apart = 0.5 * (
+            _apart(float(self.contact.first.energy.sum()), unworn.mean_energy)
+            + _apart(worn, end.loads.mean_energy)
+        )
         if "mesh" in self.probed:  # which includes the misfit
             return dict.fromkeys(WORN, apart)
         misfit = float(link.quality[1])
@@ -145,6 +149,11 @@ class ContactErrors:
         """Return the errors of a part from probe runs, or None where there are none."""
         errors = self.probed.get(part)
         return {result: None if errors is None else errors[result] for result in results}
+
+
+def _apart(on_grid: float, structural: float) -> float:
+    """Return how much larger the energy on the grid is than the structure's, relative to that."""
+    return (on_grid - structural) / structural if structural > 0.0 else 0.0
 
 
 def _with_border(

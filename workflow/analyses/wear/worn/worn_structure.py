@@ -183,14 +183,14 @@ class WornStructure:
         for body, unworn, worn in zip(bodies, *self._fields, strict=True):
             parts = []
             if unworn.notch is not None and worn.notch is not None:
-                error = _known([unworn.notch, worn.notch])
-                left = "no limit" if error is None else f"error due to the mesh {percent(error)}"
+                left = _left(unworn.notch, worn.notch)
                 if worn.local is not None:
                     left = f"local model at {_place(worn.notch)}, {left}"
                 parts.append(f"{_change(unworn.notch, worn.notch)} on the free surface ({left})")
             if worn.peak != worn.notch:
                 where = "on a contact face" if worn.peak.at_contact else "elsewhere"
-                parts.append(f"{_change(unworn.peak, worn.peak)} {where}")
+                left = _left(unworn.peak, worn.peak)
+                parts.append(f"{_change(unworn.peak, worn.peak)} {where} ({left})")
             yield f"{body.name}: von Mises stress up to {', '.join(parts)}"
 
     def interface_summary(self, number: int, width: float) -> dict[str, Any]:
@@ -225,6 +225,12 @@ def _mirrored_across(interface: Interface) -> list[str]:
 def _known(peaks: Sequence[PeakStress]) -> float | None:
     """Return the largest error of these stresses, or None if one of them has no bound."""
     return max(peak.error for peak in peaks) if all(p.bounded for p in peaks) else None
+
+
+def _left(unworn: PeakStress, worn: PeakStress) -> str:
+    """Return the larger error of two stresses in words."""
+    error = _known([unworn, worn])
+    return "no limit" if error is None else f"error due to the mesh {percent(error)}"
 
 
 def _place(peak: PeakStress) -> str:

@@ -316,9 +316,9 @@ class Mesh(Section):
     flank_nodes: tuple[FlankNodes, FlankNodes] = entry(
         "number of nodes across the flank, along the slot", [21, 27], default=(21, 27)
     )
-    size: Length = entry("distance of the nodes away from the flanks [mm]", "8 mm", default=8.0)
+    size: Length = entry("distance of the nodes away from the flanks [mm]", "12 mm", default=12.0)
     notch: Annotated[int, Whole(8, 1000)] = entry(
-        "nodes round a full circle of a fillet", 24, default=24
+        "nodes round a full circle of a fillet", 16, default=16
     )
     order: Literal[1, 2] = entry(
         "order of the tetrahedra, 1 or 2; those of order 2 join an odd number of flank nodes",
