@@ -187,13 +187,10 @@ def _moved(body: Body, displacement: Array) -> Body:
         midsides = midsides + displacement[mesh_edges(body.mesh)].mean(axis=1)
     mesh, elements = numbered_as(body.mesh, mesh), body.elements
     if elements is not None:
-        nodes = mesh.p.T
-        of_elements = replace(elements.mesh, doflocs=nodes[: elements.mesh.nvertices].T)
-        elements = replace(
-            elements,
-            mesh=numbered_as(elements.mesh, of_elements),
-            midsides=nodes[elements.mesh.nvertices :],
-        )
+        corners, middles = np.split(mesh.p, [elements.mesh.nvertices], axis=1)
+        moved = replace(elements.mesh, doflocs=np.ascontiguousarray(corners))
+        moved = numbered_as(elements.mesh, moved)
+        elements = replace(elements, mesh=moved, midsides=np.ascontiguousarray(middles.T))
     return replace(body, mesh=mesh, midsides=midsides, elements=elements)
 
 
