@@ -25,6 +25,7 @@ QUALITY = "inscribed over circumscribed radius, 1: regular"
 LITTLE = 0.01
 # Forces below this share of another force are rounding.
 ROUNDING = 1e-9
+WORN = MOMENTS[-1]
 # Unit and name of the fretting parameters.
 PARAMETERS = {
     "cracking_parameter": ("N^2/mm^3", "Ruiz's cracking parameter"),
@@ -75,8 +76,8 @@ def _worn(case: WearCase, summary: Summary, name: str) -> Iterator[SummaryQuanti
     yield of("worn area", f"{name}.worn_area", unit_in(line, "mm^2"))
     pressures = zip(MOMENTS, ("peak_pressure", "worn_peak_pressure"), strict=True)
     for moment, of_pressure in pressures:
-        path = f"{name}.peak_pressure.{moment}"
-        yield of(f"largest pressure, {moment}", path, "MPa", leading=True, **error[of_pressure])
+        path, leading = f"{name}.peak_pressure.{moment}", moment != WORN  # it has no limit there
+        yield of(f"largest pressure, {moment}", path, "MPa", leading=leading, **error[of_pressure])
     yield of("contact width along x at peak load, unworn", f"{name}.contact_width.unworn", "mm")
     path = f"{name}.elements_across"
     yield of("elements across the contact at peak load, unworn", path, "1")
@@ -182,7 +183,8 @@ def _of_structure(summary: Summary) -> Iterator[SummaryQuantity]:
         for moment in MOMENTS:
             path = f"{STRUCTURE}.peak_stress.{moment}.{body}.notch"
             text = f"largest von Mises stress on the free surface, {moment}"
-            yield of(text, f"{path}.von_mises", "MPa", **_mesh_error(summary, path))
+            error = _mesh_error(summary, path)
+            yield of(text, f"{path}.von_mises", "MPa", leading=moment == WORN, **error)
         yield of("elements", f"{mesh}.elements", "1")
         for size in ("smallest", "median", "largest"):
             yield of(f"{size} element (longest edge)", f"{mesh}.size.{size}", "mm")
