@@ -73,7 +73,7 @@ def structure() -> Ladder:
     axis = Approximation(
         "structure", "nodes across a flank of the dovetail's section", _nothing, order=2.0
     )
-    return judge(axis, _meshes("dovetail_2d", "nodes", NODES, 41, _mission), {}, {})
+    return judge(axis, _meshes("dovetail_2d", "nodes", NODES, 81, _mission), {}, {})
 
 
 def _mission(case: Any) -> dict[str, float]:

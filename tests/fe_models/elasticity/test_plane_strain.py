@@ -248,8 +248,9 @@ def rows_in_middle(history):
     """Return P and Qx per length at peak load and the slip of a cycle, at nodes near y = 0."""
     y = history.interface.coordinates[:, 1]
     levels = np.unique(np.round(y, 6))
-    middle = np.abs(y - levels[len(levels) // 2]) < 1e-6
-    spacing = levels[1] - levels[0]
+    row = len(levels) // 2
+    middle = np.abs(y - levels[row]) < 1e-6
+    spacing = 0.5 * (levels[row + 1] - levels[row - 1])
     force = history.force[PEAK][:, middle].sum(axis=1) / spacing
     slip = np.abs(history.slip[:, 0, middle]).sum(axis=0)
     order = np.argsort(history.interface.coordinates[middle, 0])

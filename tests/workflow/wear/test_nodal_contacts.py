@@ -150,7 +150,7 @@ def test_elements_alone_converge() -> None:
     found = []
     for finer in (1, 2):
         wearing = Wearing.of(
-            f"mesh={{flank_nodes: [{1 + finer * 40}, 35], order: 2}}",
+            f"mesh={{flank_nodes: [{1 + finer * 80}, 35], order: 2}}",
             f"load_path.increments=[{8 * finer}, {14 * finer}]",
         )
         *_, end = wearing.states()

@@ -369,9 +369,7 @@ def test_plane_strain_is_the_middle_of_the_slot(plane_path, tmp_path):
     The middle carries less than the mean.
     """
     alike = (
-        "mesh.flank_nodes=[14, 24]",
-        "mesh.size=7",
-        "mesh.order=1",
+        "mesh={flank_nodes: [15, 25], size: 12 mm}",
         "contact.grid=[64, 128]",
         *QUIET,
     )

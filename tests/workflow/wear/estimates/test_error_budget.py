@@ -183,7 +183,7 @@ def test_advice_on_steps_of_given_accuracy_helps(tmp_path) -> None:
 
 # --- advice on link, mesh and coupling ------------------------------------------------------------
 
-COARSE = ("mesh.flank_nodes=[12, 12]", "mesh.size=8 mm", "mesh.order=1", "contact.grid=[64, 64]")
+COARSE = ("mesh.flank_nodes=[13, 13]", "mesh.size=8 mm", "mesh.order=1", "contact.grid=[64, 64]")
 FINE = ("mesh.flank_nodes=[47, 47]", "mesh.size=2 mm", "mesh.order=2", "contact.grid=[64, 64]")
 BUDGET_KNOWN = ("error_budget=known", "stress.life.parameter=none", "output.report=false")
 

@@ -84,8 +84,9 @@ def _settings(case: DovetailCase) -> dict[str, str]:
     nodes = f"mesh.flank_nodes: {list(mesh['mesh.flank_nodes'])}"
     finer = f"{nodes} and mesh.size: {mesh['mesh.size']:g} mm"
     if case.mesh.order == 1:
-        quadratic = case.mesh.described().of_order(2).flank_nodes
-        finer = f"mesh.order: 2 and mesh.flank_nodes: {list(quadratic)}"
+        quadratic = case.mesh.described().of_order(2).refined(2.0)
+        nodes_and_size = f"{list(quadratic.flank_nodes)} and mesh.size: {quadratic.size:g} mm"
+        finer = f"mesh.order: 2 and mesh.flank_nodes: {nodes_and_size}"
     return {"link": nodes, "mesh": finer}
 
 
