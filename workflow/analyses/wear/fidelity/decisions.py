@@ -40,7 +40,7 @@ from workflow.models.budget.probe_runs import STEPS, Numbers, scales
 # width of the flank. On the default joint, meshes from 6 x 16 to 20 x 34 nodes agree on the
 # differences within 1 % of the values under the pull alone, and within 2 % under the moment, except
 # for slip and energy of the lesser flank, which scatter by 4 %. Fewer rows blur the ends.
-NODES_ACROSS, ROWS_PER_WIDTH = 9, 3
+NODES_ACROSS, ROWS_PER_WIDTH = 13, 3
 DIMENSION = "structure.dimension"
 # Elements across a flank: fewer give no useful estimate, and the largest number takes seconds to
 # condense in the plane. In space the time grows with the fourth power, so the mesh is never made
