@@ -11,19 +11,16 @@ from skfem import (
     Basis,
     BilinearForm,
     Element,
-    ElementLineP1,
-    ElementLineP2,
     ElementTetP1,
     ElementTetP2,
     ElementTriP1,
     ElementTriP2,
     FacetBasis,
     LinearForm,
-    MeshLine,
-    MeshTri,
 )
 from skfem.helpers import grad
 
+from fe_models.meshes.halving import moments_on_halves
 from fe_models.meshes.isoparametric import INTEGRATED, facet_normals, mapping_of
 from fe_models.meshes.structure_mesh import Body, in_space, mesh_edges
 from sa_solver.half_space.stress import principal_stresses
@@ -355,7 +352,7 @@ class ElasticBody:
         facets = np.asarray(mesh.boundaries[boundary])
         facets = facets[np.isin(mesh.facets[:, facets], vertices).all(axis=0)]
         if self.body.elements is not None:
-            return self._halved_moments(facets)
+            return moments_on_halves(self._of, facets)
         linear = ELEMENTS[self.dimension, 1]()
         # The degree makes products of linear functions and the elements' functions exact.
         tests, trials = (
@@ -364,24 +361,6 @@ class ElasticBody:
         )
         product = BilinearForm(lambda u, v, w: u * v)
         return product.assemble(tests).tocsr(), product.assemble(trials, tests).tocsr()
-
-    def _halved_moments(self, facets: Indices) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-        """Return the :meth:`linear_moments` over plane facets of elements that are halved.
-
-        The linear functions are those of the halves or quarters of the facets.
-        """
-        nodes, size = self._of.facet_nodes(facets), self.nodes.shape[0]
-        areas = np.linalg.norm(self._of.outward_of(facets), axis=1)
-        shape = nodes.shape + nodes.shape[1:]
-        rows = np.broadcast_to(nodes[:, :, None], shape).ravel()
-        columns = np.broadcast_to(nodes[:, None, :], shape).ravel()
-        products, moments = (
-            sp.csr_matrix(
-                ((areas[:, None, None] * on_facet).ravel(), (rows, columns)), (size, size)
-            )
-            for on_facet in _moments_on_facet(self.dimension)
-        )
-        return products, moments
 
     @property
     def _vertex_basis(self) -> Basis:
@@ -449,30 +428,6 @@ class _NodePairs:
     def of(self, values: Sequence[Array]) -> Array:
         """Return sums ``(pairs,)`` of ``k²`` arrays ``(m,)``, one per pair of element nodes."""
         return np.asarray(self._sum @ np.concatenate(values))
-
-
-def _moments_on_facet(dimension: int) -> tuple[Array, Array]:
-    """Return ∫ φ_i φ_k dA and ∫ φ_i N_j dA over a facet of unit area with quadratic functions N.
-
-    φ are linear on the halves or quarters of the facet. Both are in the order of
-    :meth:`Body.facet_nodes`.
-    """
-    kind, linear, quadratic = (
-        (MeshTri, ElementTriP1, ElementTriP2)
-        if dimension == 3
-        else (MeshLine, ElementLineP1, ElementLineP2)
-    )
-    whole = kind.init_refdom()
-    halves, element = Basis(whole.refined(), linear(), intorder=3), quadratic()
-    points = np.asarray(halves.global_coordinates())
-    functions = [element.lbasis(points, j)[0] for j in range(len(element.doflocs))]
-    apart = np.linalg.norm(halves.doflocs[:, None, :] - element.doflocs.T[:, :, None], axis=0)
-    products = BilinearForm(lambda u, v, w: u * v).assemble(halves).toarray()
-    form = LinearForm(lambda v, w: w.f * v)
-    moments = np.stack([form.assemble(halves, f=function) for function in functions], axis=1)
-    order = apart.argmin(axis=1)
-    area = products.sum()
-    return products[np.ix_(order, order)] / area, moments[order] / area
 
 
 def _normal_integrals(basis: FacetBasis) -> Array:

@@ -295,6 +295,8 @@ class Dovetail:
         checks.number("size", size, above=0.0, error=MeshError)
         if checks.whole("notch", notch, MeshError) < 1 or dimension not in (2, 3):
             raise MeshError(f"notch {notch}, dimension {dimension!r}: give 1 or more, and 2 or 3")
+        if order not in (1, 2):
+            raise MeshError(f"order {order!r}: give 1 or 2")
         if dimension == 2 and self.skew != 0.0:
             raise MeshError("a skewed slot is not the same all along: model it in 3 dimensions")
         if order == 2:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.sparse as sp
 
 from fe_models.meshes.curved_face import edge_numbers
 from fe_models.meshes.structure_mesh import Body, mesh_edges, named_mesh, numbered_as
-from sa_solver.types import Indices
+from sa_solver.types import Array, Indices
 
 if TYPE_CHECKING:
     from skfem import MeshTet, MeshTri
@@ -67,3 +68,56 @@ def _halved_facets(body: Body, facets: Indices) -> Indices:
     for k, corner in enumerate(facets.T):
         parts.append(np.stack([corner, middles[k], middles[k - 1]], axis=1))
     return np.concatenate(parts)
+
+
+def moments_on_halves(body: Body, facets: Indices) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Return ∫ φ_i φ_k dA and ∫ φ_i N_j dA over plane facets of second-order elements [mm²].
+
+    φ are linear on the halves or quarters of the facets, which are given by number, and N quadratic
+    on the whole ones. The matrices are ``(n, n)`` for all nodes of the elements of ``body``.
+    """
+    nodes, size = body.facet_nodes(facets), body.mesh.nvertices + len(mesh_edges(body.mesh))
+    areas = np.linalg.norm(body.outward_of(facets), axis=1)
+    shape = nodes.shape + nodes.shape[1:]
+    rows = np.broadcast_to(nodes[:, :, None], shape).ravel()
+    columns = np.broadcast_to(nodes[:, None, :], shape).ravel()
+    products, moments = (
+        sp.csr_matrix(((areas[:, None, None] * on_facet).ravel(), (rows, columns)), (size, size))
+        for on_facet in _moments_on_facet(body.mesh.dim())
+    )
+    return products, moments
+
+
+def _moments_on_facet(dimension: int) -> tuple[Array, Array]:
+    """Return the integrals of :func:`moments_on_halves` over a facet of unit area.
+
+    They are in the order of :meth:`Body.facet_nodes`.
+    """
+    from skfem import (
+        Basis,
+        BilinearForm,
+        ElementLineP1,
+        ElementLineP2,
+        ElementTriP1,
+        ElementTriP2,
+        LinearForm,
+        MeshLine,
+        MeshTri,
+    )
+
+    kind, linear, quadratic = (
+        (MeshTri, ElementTriP1, ElementTriP2)
+        if dimension == 3
+        else (MeshLine, ElementLineP1, ElementLineP2)
+    )
+    whole = kind.init_refdom()
+    halves, element = Basis(whole.refined(), linear(), intorder=3), quadratic()
+    points = np.asarray(halves.global_coordinates())
+    functions = [element.lbasis(points, j)[0] for j in range(len(element.doflocs))]
+    apart = np.linalg.norm(halves.doflocs[:, None, :] - element.doflocs.T[:, :, None], axis=0)
+    products = BilinearForm(lambda u, v, w: u * v).assemble(halves).toarray()
+    form = LinearForm(lambda v, w: w.f * v)
+    moments = np.stack([form.assemble(halves, f=function) for function in functions], axis=1)
+    order = apart.argmin(axis=1)
+    area = products.sum()
+    return products[np.ix_(order, order)] / area, moments[order] / area

@@ -238,6 +238,9 @@ def test_a_body_without_mass_is_warned_of(body, name):
 def test_elements_are_of_order_1_or_2():
     with pytest.raises(InputError):
         fretscale.DovetailMesh(order=3)
+    for nodes in ((20, 27), (21, 34)):  # an element of order 2 has three nodes on an edge
+        with pytest.raises(InputError):
+            fretscale.DovetailMesh(nodes)
 
 
 def test_a_checkpoint_is_a_file_in_a_folder(tmp_path):

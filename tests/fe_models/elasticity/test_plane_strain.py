@@ -276,7 +276,7 @@ def test_space_tends_to_the_plane_without_poisson_and_roundings(dovetail, missio
 
     plane = solve((7, 2), 2)
     differences = []
-    for rows in (5, 17):
+    for rows in (5, 19):  # four times as close to each other in the middle
         for history, other in zip(plane, solve((7, rows), 3), strict=True):
             pressed, sheared, slip = rows_in_middle(other)
             order = np.argsort(history.interface.coordinates[:, 0])
@@ -289,8 +289,7 @@ def test_space_tends_to_the_plane_without_poisson_and_roundings(dovetail, missio
                 ]
             )
     coarse, fine = np.max(differences[:2], axis=0), np.max(differences[2:], axis=0)
-    # The rows in the middle are 0.264 times as far apart.
-    assert np.all(fine < 0.264 * coarse)
+    assert np.all(fine < 0.25 * coarse)
     assert np.all(fine < 1e-3)
 
 

@@ -225,5 +225,7 @@ def test_elements_of_second_order_move_with_their_nodes(dovetail, titanium, capl
     for before, after in zip(mesh.bodies, worn_mesh(mesh, depths).bodies, strict=True):
         assert np.abs(after.points - before.points).max() > 0.005
         np.testing.assert_array_equal(ElasticBody(after, titanium, 2).nodes, after.points)
+        with pytest.raises(ValueError, match="second order"):
+            ElasticBody(after, titanium, 1)
     # scikit-fem copies arrays in another order, and says so.
     assert not caplog.records

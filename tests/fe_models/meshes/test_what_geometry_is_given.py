@@ -99,6 +99,8 @@ def test_what_is_no_number_is_refused(value):
         lambda: JOINT.mesh((9.5, 9), size=4.0),
         lambda: JOINT.mesh((1, 9), size=4.0),
         lambda: JOINT.mesh((9, 9), size=4.0, dimension=1),
+        lambda: JOINT.mesh((9, 9), size=4.0, order=3),
+        lambda: JOINT.mesh((10, 9), size=4.0, order=2),  # an element has three nodes on an edge
         lambda: Dovetail(**SECTION | {"blades": 1}),
         lambda: read_bodies("plate.inp", unit="metre"),
         lambda: read_bodies("plate.step", size=-1.0),

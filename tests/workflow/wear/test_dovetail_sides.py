@@ -50,3 +50,14 @@ def test_skewed_slots_have_no_cyclic_sides():
     ending = invoke("check", case, *settings(["structure.sides=cyclic", "structure.skew=5 deg"]))
     assert ending.exit_code == 2
     assert "are not images of each other; allowed: guided, or skew 0" in ending.stderr
+
+
+def test_elements_of_order_2_have_odd_numbers_of_nodes():
+    case = CASES / "dovetail.yaml"
+    ending = invoke("check", case, *settings(["mesh.flank_nodes=[20, 34]"]))
+    assert ending.exit_code == 2
+    assert "mesh.flank_nodes" in ending.stderr
+    assert (
+        invoke("check", case, *settings(["mesh.flank_nodes=[20, 34]", "mesh.order=1"])).exit_code
+        == 0
+    )

@@ -99,13 +99,13 @@ def test_increments_are_those_of_the_section(case):
 @pytest.mark.slow
 def test_probe_runs_of_increments_are_of_second_order(case):
     """Doubling the increments again changes a quarter as much or less."""
-    section = plane_section(case)
+    section = changed(plane_section(case), {"mesh.flank_nodes": (10, 10)})
     legs = [(4 * k, 7 * k) for k in (1, 2, 4, 8)]
     values = [section_wear(changed(section, case.divided(counts))) for counts in legs]
     for flank, quantities in values[-1].items():
         for name, value in quantities.items():
             before, last = values[-3][flank][name], values[-2][flank][name]
-            assert 0.0 < (value - last) / (last - before) < 0.3
+            assert 0.1 < (value - last) / (last - before) < 0.3
 
 
 # --- meshes and grids -----------------------------------------------------------------------------
