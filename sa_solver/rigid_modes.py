@@ -11,6 +11,7 @@ three modes of u_x and u_y (:class:`PlanarModes`), and the contact of dissimilar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -86,24 +87,25 @@ class NormalModes:
 
     def motion(self, coefficients: Array) -> Array:
         """Return the rigid displacement field ``(nx, ny)`` with these ``coefficients`` ``(k,)``."""
-        along_x, along_y = self._profiles(coefficients)
+        along_x, along_y = self._profiles(_of_all_modes(self.free, coefficients))
         return along_x[:, None] + along_y
 
     def subtract(self, field: Array, coefficients: Array, out: Array) -> None:
         """Write ``field - motion(coefficients)`` to ``out``, all ``(nx, ny)``."""
-        along_x, along_y = self._profiles(coefficients)
-        np.subtract(field, along_x[:, None], out=out)
-        if along_y.any():
-            out -= along_y
+        approach, tilt_x, tilt_y = _of_all_modes(self.free, coefficients)
+        np.subtract(field, (approach - tilt_y * self.x)[:, None] if tilt_y else approach, out=out)
+        if tilt_x:
+            out -= tilt_x * self.y
 
     def subtract_weighted(
         self, field: Array, weight: Array, coefficients: Array, scratch: Array
     ) -> None:
         """Subtract ``weight * motion(coefficients)`` from ``field`` in place, all ``(nx, ny)``."""
-        along_x, along_y = self._profiles(coefficients)
-        field -= np.multiply(weight, along_x[:, None], out=scratch)
-        if along_y.any():
-            field -= np.multiply(weight, along_y, out=scratch)
+        approach, tilt_x, tilt_y = _of_all_modes(self.free, coefficients)
+        along_x = (approach - tilt_y * self.x)[:, None] if tilt_y else approach
+        field -= np.multiply(weight, along_x, out=scratch)
+        if tilt_x:
+            field -= np.multiply(weight, tilt_x * self.y, out=scratch)
 
     def fields(self) -> Array:
         """Return the modes as fields ``(k, nx, ny)``."""
@@ -136,7 +138,7 @@ class NormalModes:
             i, j, signs = self._places
             missing = target - signs * moments[i, j]
             if np.abs(missing).max() <= BALANCE_TOLERANCE * moments[0, 0]:
-                along_x, along_y = (np.exp(part) for part in self._all_profiles(exponent))
+                along_x, along_y = (np.exp(part) for part in self._profiles(exponent))
                 balanced: Array = pressure * along_x[:, None]
                 balanced *= along_y
                 return balanced
@@ -148,13 +150,11 @@ class NormalModes:
     # -- fields that are the sum or product of a profile along x and one along y ----------------
     @cached_property
     def _powers_x(self) -> Array:
-        """Powers 1, x and x² ``(3, nx)``."""
-        return np.stack([np.ones_like(self.x), self.x, self.x * self.x])
+        return _powers(self.x)
 
     @cached_property
     def _powers_y(self) -> Array:
-        """Powers 1, y and y² ``(ny, 3)``."""
-        return np.stack([np.ones_like(self.y), self.y, self.y * self.y], axis=1)
+        return _powers(self.y).T
 
     @cached_property
     def _places(self) -> tuple[Indices, Indices, Array]:
@@ -169,28 +169,36 @@ class NormalModes:
         i, j, signs = self._places
         return i[:, None] + i, j[:, None] + j, signs[:, None] * signs
 
-    def _profiles(self, coefficients: Array) -> tuple[Array, Array]:
-        all_three = np.zeros(3)
-        all_three[list(self.free)] = coefficients
-        return self._all_profiles(all_three)
-
-    def _all_profiles(self, all_three: Array) -> tuple[Array, Array]:
+    def _profiles(self, all_three: Sequence[float] | Array) -> tuple[Array, Array]:
         """Return the profiles along x and y of the motion with the coefficients of all modes."""
         return all_three[APPROACH] - all_three[TILT_Y] * self.x, all_three[TILT_X] * self.y
 
     def _largest(self, all_three: Array) -> float:
         """Return the largest size of this motion, which is at a corner of the grid."""
-        along_x, along_y = (profile[[0, -1]] for profile in self._all_profiles(all_three))
+        along_x, along_y = (profile[[0, -1]] for profile in self._profiles(all_three))
         return max(float(np.abs(along_x[:, None] + along_y).max()), np.finfo(float).tiny)
 
     def _moments(self, weight: Array, exponent: Array) -> Array:
         """Return ``Σ w e x^i y^j`` for i, j up to 2, with e the exponential of a rigid motion."""
-        along_x, along_y = (np.exp(part) for part in self._all_profiles(exponent))
+        along_x, along_y = (np.exp(part) for part in self._profiles(exponent))
         return (self._powers_x * along_x) @ (weight @ (self._powers_y * along_y[:, None]))
 
     def _products(self, moments: Array) -> Array:
         i, j, signs = self._places_of_products
         return np.asarray(signs * moments[i, j])
+
+
+def _powers(coordinate: Array) -> Array:
+    """Return the powers 0, 1 and 2 ``(3, n)`` of a ``coordinate`` ``(n,)``."""
+    return np.stack([np.ones_like(coordinate), coordinate, coordinate * coordinate])
+
+
+def _of_all_modes(free: tuple[int, ...], coefficients: Array) -> list[float]:
+    """Return the coefficients of three modes, which are 0 for those that are not ``free``."""
+    all_three = [0.0, 0.0, 0.0]
+    for mode, coefficient in zip(free, coefficients.tolist(), strict=True):
+        all_three[mode] = coefficient
+    return all_three
 
 
 def pseudoinverse(matrix: Array) -> Array:
@@ -250,10 +258,9 @@ class PlanarModes:
 
     def sums(self, field: Array) -> Array:
         """Return the products ``(k,)`` of a field ``(2, nx, ny)`` with the modes."""
-        along_x, along_y = field @ self._powers_y
-        rotation = self.x @ along_y[:, 0] - along_x[:, 1].sum()
-        all_three = np.array([along_x[:, 0].sum(), along_y[:, 0].sum(), rotation])
-        return all_three[list(self.free)]
+        along_x, along_y = self._moments(field)
+        all_three = along_x[0][0], along_y[0][0], along_y[1][0] - along_x[0][1]
+        return np.array([all_three[mode] for mode in self.free])
 
     def add_motion(self, field: Array, coefficients: Array) -> None:
         """Add the rigid motion with these coefficients ``(k,)`` to a field ``(2, nx, ny)``."""
@@ -279,31 +286,34 @@ class PlanarModes:
 
         ``xx``, ``xy`` and ``yy`` ``(nx, ny)`` are the components of the tensors.
         """
-        moments = np.array([tensor @ self._powers_y for tensor in (xx, xy, yy)])
-        (xx_, xy_, yy_), x = moments, self.x
-        x_rotation = x @ xy_[:, 0] - xx_[:, 1].sum()
-        y_rotation = x @ yy_[:, 0] - xy_[:, 1].sum()
-        rotation_squared = xx_[:, 2].sum() - 2.0 * (x @ xy_[:, 1]) + (x * x) @ yy_[:, 0]
-        x_y = xy_[:, 0].sum()
-        all_products = np.array(
-            [
-                [xx_[:, 0].sum(), x_y, x_rotation],
-                [x_y, yy_[:, 0].sum(), y_rotation],
-                [x_rotation, y_rotation, rotation_squared],
-            ]
+        xx_, xy_, yy_ = self._moments(np.stack([xx, xy, yy]))
+        x_rotation = xy_[1][0] - xx_[0][1]
+        y_rotation = yy_[1][0] - xy_[0][1]
+        rotation_squared = xx_[0][2] - 2.0 * xy_[1][1] + yy_[2][0]
+        all_products = (
+            (xx_[0][0], xy_[0][0], x_rotation),
+            (xy_[0][0], yy_[0][0], y_rotation),
+            (x_rotation, y_rotation, rotation_squared),
         )
-        return all_products[np.ix_(self.free, self.free)]
+        return np.array([[all_products[i][j] for j in self.free] for i in self.free])
+
+    def _moments(self, fields: Array) -> list[list[list[float]]]:
+        """Return ``Σ f x^i y^j`` of each of ``fields`` ``(m, nx, ny)``, for i, j up to 2."""
+        moments: list[list[list[float]]] = (self._powers_x @ (fields @ self._powers_y)).tolist()
+        return moments
+
+    @cached_property
+    def _powers_x(self) -> Array:
+        return _powers(self.x)
 
     @cached_property
     def _powers_y(self) -> Array:
-        """Powers 1, y and y² ``(ny, 3)``."""
-        return np.stack([np.ones_like(self.y), self.y, self.y * self.y], axis=1)
+        return _powers(self.y).T
 
     def _profiles(self, coefficients: Array) -> tuple[Array, Array]:
         """Return the displacement along x, ``(ny,)``, and along y, ``(nx,)``."""
-        all_three = np.zeros(3)
-        all_three[list(self.free)] = coefficients
-        return all_three[0] - all_three[2] * self.y, all_three[1] + all_three[2] * self.x
+        shift_x, shift_y, twist = _of_all_modes(self.free, coefficients)
+        return shift_x - twist * self.y, shift_y + twist * self.x
 
 
 class RigidModes:
