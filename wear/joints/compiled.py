@@ -8,11 +8,13 @@ cache therefore has a folder for each version of all files of this package.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from filelock import FileLock
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 # The attributes of numba's configuration are set at run time, which type checkers cannot see.
@@ -44,3 +46,19 @@ def compiled(**options: Any) -> Callable[[Function], Function]:
             config.CACHE_DIR = previous
 
     return compile_function
+
+
+@contextmanager
+def compiling_in_turn(function: Callable[..., Any]) -> Iterator[None]:
+    """Hold a lock during the first call of a compiled function in this process.
+
+    Processes that need the function at the same time wait for the first of them and then load what
+    it has compiled, which takes up to 20 s. Without a lock, as in a folder that cannot be
+    written, each of them compiles.
+    """
+    with ExitStack() as held:
+        if not getattr(function, "signatures", True):
+            with suppress(OSError, NotImplementedError):
+                CACHE_FOLDER.mkdir(parents=True, exist_ok=True)
+                held.enter_context(FileLock(CACHE_FOLDER / "compiling.lock"))
+        yield

@@ -95,6 +95,7 @@ class HarmonicTransfer:
     def modal(self, force: Array) -> ComplexArray:
         """Return modal forces ``(k, n)`` for coefficients ``(j, m, d)`` of forces on the joints."""
         if self._few:
+            force = np.ascontiguousarray(force)  # so that the loop is compiled only once
             return _few_on_modes(force, self.receptance.at_joints, *self.resolution.places)
         return self.resolution.complex_from_real(by_function(force) @ self.receptance.at_joints)
 

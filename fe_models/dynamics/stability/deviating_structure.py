@@ -423,8 +423,9 @@ def _given_motion(
         # motion.
         turns = np.exp(2j * np.pi * np.outer(times.starts / times.parts, driven.harmonics))
         moved = moved - (turns @ driven.load @ structure.to_load.T).real
-    after = np.arange(steps + 1) % steps
-    return GivenMotion(moved[after][:, places], force[after][:, places])
+    # Rows are contiguous, so that the loops over steps are compiled only once.
+    after = np.ix_(np.arange(steps + 1) % steps, places)
+    return GivenMotion(moved[after], force[after])
 
 
 def _shifts(

@@ -28,6 +28,14 @@ from kernels.slope import slope
 def doubled():
     return 2.0 * slope()
 """
+IN_TURN = """
+from kernels.compiled import compiling_in_turn
+from kernels.doubled import doubled
+
+with compiling_in_turn(doubled):
+    doubled()
+print(sum(doubled.stats.cache_misses.values()))
+"""
 ASKED = "from kernels.doubled import doubled; print(doubled())"
 
 
@@ -55,6 +63,24 @@ def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
         )
         assert float(ended.stdout) == 2.0 * value
     assert len(list((package / "__pycache__").glob("numba-*"))) == 2
+
+
+@pytest.mark.slow
+def test_of_processes_that_need_a_function_at_once_only_one_compiles_it(tmp_path):
+    package = tmp_path / "kernels"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    shutil.copy(compiled.__file__, package)
+    (package / "doubled.py").write_text(DOUBLED, encoding="utf-8")
+    (package / "slope.py").write_text(SLOPE.format(value=2.0), encoding="utf-8")
+    command = [sys.executable, "-c", IN_TURN]
+    kept_beside = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    at_once = [
+        subprocess.Popen(command, cwd=tmp_path, env=kept_beside, stdout=subprocess.PIPE, text=True)
+        for _ in range(3)
+    ]
+    compilations = [int(process.communicate()[0]) for process in at_once]
+    assert sorted(compilations) == [0, 0, 1]
 
 
 def test_kernels_of_joints_are_kept_by_the_version_of_their_package():

@@ -28,6 +28,7 @@ import numpy as np
 from sa_solver import checks
 from sa_solver.types import Array
 from wear.joints.bouc_wen import BoucWen
+from wear.joints.compiled import compiling_in_turn
 from wear.joints.elastic import ElasticLaw, settle_elastic
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
@@ -247,7 +248,7 @@ class PeriodicMarch:
         if isinstance(law, ElasticLaw):
             remembered, linearise = 0, linearise_elastic
         else:
-            self._kernels[0].settle(Period.of(basis, basis.T, lead), driven)
+            self._march(self._kernels[0].settle, Period.of(basis, basis.T, lead), driven)
         maps = Maps.room(samples, joints, remembered, directions)
         linearise(driven, maps)
         return LinearisedMarch.of(maps)
@@ -299,12 +300,14 @@ class PeriodicMarch:
         joints = len(driven.change)
         shares = min(self.threads, joints)
         if shares <= 1:
-            kernel(period, driven)
+            with compiling_in_turn(kernel):
+                kernel(period, driven)
             return
         ends = [joints * share // shares for share in range(shares + 1)]
 
         def march(share: slice) -> None:
-            kernel(period, DrivenJoints(*(part[share] for part in driven)))
+            with compiling_in_turn(kernel):
+                kernel(period, DrivenJoints(*(part[share] for part in driven)))
 
         with ThreadPoolExecutor(shares) as pool:
             list(pool.map(march, map(slice, ends[:-1], ends[1:])))
