@@ -9,6 +9,7 @@ so that a symmetric load gives a result that is symmetric up to rounding.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from math import ceil
 from typing import Any, Literal
 
 import numpy as np
@@ -35,10 +36,11 @@ from sa_solver.types import Array, Frame
 # 41 nodes 0.4, 0.5 and 0.8 leave 0.9, 1.2 and 2.6 % in the contact, 4, 5 and 8 % beside it; less
 # growth takes more nodes in space. The growth from fillets affects only the stress there.
 SIZE_GROWTH, FILLET_GROWTH = {1: 0.25, 2: 0.5}, 0.7
-# Layers of elements along the slot mix even ones with ones that grow from the ends as
-# a cosine does, with this share: they are 0.55 times as long as the mean there, in the middle 1.26
-# times. Pressure and slip change near the ends.
-END_GRADING = 0.45
+# Share of the layers along the slot that divide the rounding at each end, where pressure and wear
+# are largest, and the least length that they divide, relative to the slot. The layers between grow
+# from the ends: at most this share of them as a cosine does, the rest is even.
+END_LAYERS, LEAST_END = 0.15, 0.03
+MOST_GRADED = 0.6
 # Number of points along a curve from which distances are measured: many more than it usually has
 # nodes.
 SAMPLES = 200
@@ -449,7 +451,7 @@ def _mesh_body(
         halves, cells = [(2, surface) for surface in surfaces], surfaces
         swept = {label: curves for label, curves in named.items() if label not in UNNAMED}
         if dimension == 3:
-            layers = _layers(flank_nodes[1] - 1)
+            layers = _layers(flank_nodes[1] - 1, dovetail.end_width / dovetail.slot_length)
             extruded = model.occ.extrude(halves, *slot, np.ones_like(layers, dtype=int), layers)
             model.occ.synchronize()
             cells = [tag for dim, tag in extruded if dim == 3]
@@ -464,11 +466,22 @@ def _mesh_body(
     return Body(name, named_mesh(points[:, AXES[dimension]], elements, facets))
 
 
-def _layers(count: int) -> Array:
-    """Return the ends ``(count,)`` of the layers of elements along the slot, up to 1."""
-    even = np.linspace(0.0, 1.0, count + 1)[1:]
-    graded = 0.5 * (1.0 - np.cos(np.pi * even))
-    return np.asarray((1.0 - END_GRADING) * even + END_GRADING * graded)
+def _layers(count: int, end: float) -> Array:
+    """Return the ends ``(count,)`` of the layers of elements along the slot, up to 1.
+
+    ``end`` is the width of the rounding at each end, relative to the slot.
+    """
+    at_end = min(ceil(END_LAYERS * count), (count - 1) // 2)
+    between = count - 2 * at_end
+    end = min(max(end, LEAST_END), END_LAYERS) if at_end else 0.0
+    low = np.linspace(0.0, end, at_end + 1)
+    even = np.linspace(0.0, 1.0, between + 1)
+    cosine = 0.5 * (1.0 - np.cos(np.pi * even))
+    # The first layer between is no shorter than those at the ends.
+    finer = 1.0 - low[1] / (1.0 - 2.0 * end) * between if at_end else 1.0
+    graded = min(max(finer / (1.0 - between * cosine[1]), 0.0), MOST_GRADED) if between > 2 else 0.0
+    middle = end + (1.0 - 2.0 * end) * (even + graded * (cosine - even))
+    return np.concatenate([low, middle[1:], 1.0 - low[-2::-1]])[1:]
 
 
 def _draw_halves(
