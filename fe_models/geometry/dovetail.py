@@ -451,7 +451,7 @@ def _mesh_body(
         halves, cells = [(2, surface) for surface in surfaces], surfaces
         swept = {label: curves for label, curves in named.items() if label not in UNNAMED}
         if dimension == 3:
-            layers = _layers(flank_nodes[1] - 1, dovetail.end_width / dovetail.slot_length)
+            layers = _layers(flank_nodes[1] - 1, (dovetail.end_width or 0.0) / dovetail.slot_length)
             extruded = model.occ.extrude(halves, *slot, np.ones_like(layers, dtype=int), layers)
             model.occ.synchronize()
             cells = [tag for dim, tag in extruded if dim == 3]

@@ -307,6 +307,9 @@ class MeshAssembly:
     def section(self) -> None:
         """Return None: bodies of a file need not be the same all along."""
 
+    def along_slot(self) -> None:
+        """Return None: nothing is known of the direction of a mesh."""
+
     def finer_mesh(self) -> FinerMesh | None:
         """Return the bodies with elements of second order, if they are of first order and few."""
         cheap = self._plain.interfaces[0].line or self._plain.node_count(1) <= MOST_NODES

@@ -76,6 +76,18 @@ class FinerMesh:
     share: float = 1.0
 
 
+class MeshesAlongSlot(NamedTuple):
+    """A structure with few nodes across its faces, on two meshes for probe runs.
+
+    ``own`` has as many nodes along the slot as the structure, ``coarser`` about half as many. The
+    error due to this number is ``share`` times the difference of their results.
+    """
+
+    own: StructureModel
+    coarser: StructureModel
+    share: float
+
+
 class StructureModel(Protocol):
     """A structure of finite elements: its mesh, loads, supports and contact faces.
 
@@ -145,6 +157,10 @@ class StructureModel(Protocol):
 
     def finer_mesh(self) -> FinerMesh | None:
         """Return the structure on a finer mesh for probe runs, or None without a cheap one."""
+        ...
+
+    def along_slot(self) -> MeshesAlongSlot | None:
+        """Return the structure on two meshes that differ along the slot, or None without a slot."""
         ...
 
     def notch_models(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 # Sources of error, in the order of their datasets.
-PARTS = ("link", "mesh", "increments", "grid", "steps", "coupling", "solver")
+PARTS = ("link", "mesh", "slot", "increments", "grid", "steps", "coupling", "solver")
 # Results with estimated errors, by name and in words: wear, and pressures.
 WORN = {"depth": "depth", "volume": "volume"}
 PRESSURES = {

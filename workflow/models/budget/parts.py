@@ -17,6 +17,7 @@ from sa_solver.types import Array
 from workflow.models.budget import names
 from workflow.models.budget.names import PRESSURES, WORN
 from workflow.models.budget.outcome import InterfaceOutcome
+from workflow.models.budget.probe_models import structure_of
 from workflow.models.contact import Contact
 from workflow.models.loads import LoadSource, UncoupledSource
 from workflow.models.uncoupled.body_pair import BodyPairSource
@@ -113,6 +114,12 @@ class ContactErrors:
     def mesh(self) -> ErrorByResult | None:
         return None if self.half_spaces else self._from_probes("mesh", WORN | PRESSURES)
 
+    def slot(self) -> ErrorByResult | None:
+        structure = structure_of(self.model)
+        if structure is None or structure.along_slot() is None:
+            return None
+        return self._from_probes("slot", WORN | PRESSURES)
+
     def increments(self) -> ErrorByResult:
         return _by_result(self.contact.increments_error, "depth", "energy", "depth")
 
@@ -201,7 +208,8 @@ class BudgetPart:
 
 
 # Results whose error has a known sign. Steps and increments make some places of a surface too deep
-# and others too shallow, and nothing is known of the sign at worn edges.
+# and others too shallow. Nothing is known of the sign at worn edges, nor of that due to the mesh
+# along the slot, which is compared on few nodes across it.
 VOLUME = ("volume",)
 WEAR = "depth", *VOLUME
 WEAR_AND_PEAK = *WEAR, "peak_pressure"
@@ -209,6 +217,7 @@ WEAR_AND_PEAK = *WEAR, "peak_pressure"
 PARTS = {
     "link": BudgetPart(ContactErrors.link, WEAR),
     "mesh": BudgetPart(ContactErrors.mesh, WEAR_AND_PEAK),
+    "slot": BudgetPart(ContactErrors.slot),
     "increments": BudgetPart(ContactErrors.increments, VOLUME),
     "grid": BudgetPart(ContactErrors.grid, WEAR_AND_PEAK),
     "steps": BudgetPart(ContactErrors.steps),

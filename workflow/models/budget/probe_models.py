@@ -30,6 +30,8 @@ from workflow.models.wear import WearModel
 MOST_CELLS, FEWEST = 64, 8
 # Below this rate, loads that follow wear have hardly settled by the end of a probe run.
 SLOW = 1e-2
+# Cells across and along the faces of probe runs that compare meshes along a slot.
+SLOT_CELLS = 32, 64
 
 Resultants = Literal["constant", "every"]
 
@@ -38,9 +40,9 @@ Resultants = Literal["constant", "every"]
 class Probed:
     """Errors from probe runs: relative, positive where a result is too large.
 
-    ``errors`` are those of ``mesh``, ``grid`` and ``link`` and, under ``coupling``, of loads that
-    do not follow wear at all; loads that follow late cause the share :func:`late` of these. Loads
-    settle at the ``rate``. ``failures`` has the reason why a part is missing.
+    ``errors`` are those of ``mesh``, ``slot``, ``grid`` and ``link`` and, under ``coupling``, of
+    loads that do not follow wear at all; loads that follow late cause the share :func:`late` of
+    these. Loads settle at the ``rate``. ``failures`` has the reason why a part is missing.
     """
 
     errors: dict[str, Numbers] = field(default_factory=dict)
@@ -53,11 +55,12 @@ class Neighbour:
     """A finer or coarser model; the error of the model is ``share`` times their difference.
 
     The difference is relative to the finer of both: a ``share`` below 0 means that this is the
-    coarser one.
+    coarser one. It is compared with the model ``own``, by default that of all neighbours.
     """
 
     model: WearModel
     share: float = 1.0
+    own: WearModel | None = None
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class ProbeModels:
     @classmethod
     def of(cls, model: WearModel, source: LoadSource) -> ProbeModels:
         """Return the probe models of a model whose loads are ``source``."""
-        structure, section, wear = _structure(model), None, model.wear
+        structure, section, wear = structure_of(model), None, model.wear
         if structure is not None and (section := structure.section()) is not None:
             structure, wear = section, replace(wear, motion="neglect")
         line = source.line or section is not None
@@ -91,6 +94,8 @@ class ProbeModels:
         neighbours = {}
         if structure is not None and (finer := structure.finer_mesh()) is not None:
             neighbours["mesh"] = Neighbour(replace(own, structure=finer.structure), finer.share)
+        if (slot := along_slot(model)) is not None:
+            neighbours["slot"] = slot
         if (other := _other_grid(grid, of_model, line)) is not None:
             # The error of the model is smaller than that of the probe model by the last factor.
             refined, coarser = other[0] / grid[0], (grid[0] / across) ** GRID_ORDER
@@ -133,9 +138,10 @@ class ProbeModels:
             if part == "coupling":
                 return _difference(own("constant"), own("every"), 1.0)
             neighbour = self.neighbours[part]
-            if part == "mesh":
-                other = probe_run(neighbour.model, source_of(neighbour.model), kind)
-                return _difference(first, other, neighbour.share)
+            if part in ("mesh", "slot"):
+                mine, other = neighbour.own, neighbour.model
+                alike = first if mine is None else probe_run(mine, source_of(mine), kind)
+                return _difference(alike, probe_run(other, source_of(other), kind), neighbour.share)
             # Unworn loads suffice for effects of the contacts.
             return _difference(own("constant"), probe_run(neighbour.model, shared), neighbour.share)
 
@@ -177,11 +183,25 @@ def _settling_rate(run: ProbeRun) -> float:
 Cells = tuple[int, int]
 
 
-def _structure(model: WearModel) -> StructureModel | None:
+def structure_of(model: WearModel) -> StructureModel | None:
     """Return the structure of finite elements of a model, None where it has none."""
     if hasattr(model.structure, "meshed"):
         return cast("StructureModel", model.structure)
     return None
+
+
+def along_slot(model: WearModel) -> Neighbour | None:
+    """Return the models on meshes that differ along a slot, None without one."""
+    structure = structure_of(model)
+    if structure is None or (meshes := structure.along_slot()) is None:
+        return None
+    fewest = np.min([*_grids(model).values(), SLOT_CELLS], axis=0)
+    settings = {"grid": tuple(fewest.tolist()), "method": "normal", "tolerance": TOLERANCE}
+    own, coarser = (
+        _with(WearModel(meshed, model.contacts, model.wear), **settings)
+        for meshed in (meshes.own, meshes.coarser)
+    )
+    return Neighbour(coarser, meshes.share, own)
 
 
 def _contacts(model: WearModel) -> Mapping[str, Contact]:

@@ -187,6 +187,23 @@ def flank_mesh(case: Any, factor: float) -> dict[str, Any]:
     return {"mesh.flank_nodes": refined.flank_nodes, "mesh.size": refined.size}
 
 
+def slots(case: Case) -> Iterator[Rung]:
+    """Yield fewer and more nodes along the slot of a dovetail in space."""
+    if entry_at(case, "mesh.flank_nodes") is None or is_line(case):
+        return
+    for factor in MESHES_3D:
+        settings = slot_mesh(case, factor)
+        _, along = settings["mesh.flank_nodes"]
+        yield Rung(f"{along} nodes along the slot", settings, 1.0 / factor)
+
+
+def slot_mesh(case: Any, factor: float) -> dict[str, Any]:
+    """Return the mesh of a dovetail with layers along the slot that are finer by ``factor``."""
+    across, _ = case.mesh.flank_nodes
+    _, along = case.mesh.described().refined(factor).flank_nodes
+    return {"mesh.flank_nodes": (across, along)}
+
+
 def _elements(case: Any, factor: float) -> dict[str, Any]:
     return {"mesh.size": case.mesh.size / factor}
 

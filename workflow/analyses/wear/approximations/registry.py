@@ -74,6 +74,13 @@ APPROXIMATIONS = (
         decide=decisions.choose_mesh,
         remedy=Remedy("mesh", "the mesh of the structure"),
     ),
+    Approximation(
+        *("slot", "nodes along the slot", ladders.slots),
+        entries=("mesh.flank_nodes",),
+        order=convergence.MESH_ORDER,
+        decide=decisions.choose_slot,
+        remedy=Remedy("slot", "mesh.flank_nodes"),
+    ),
     Approximation("order", "order of the finite elements", ladders.orders, ("mesh.order",)),
     Approximation(
         *("reference", "half-space, or finite elements alone", ladders.references),

@@ -22,8 +22,10 @@ from workflow.analyses.wear.fidelity.probe import (
     NOTCH,
     coupled_wear,
     plane_section,
+    resultants_of,
     section_wear,
     slot_wear,
+    wear_along_slot,
 )
 from workflow.analyses.wear.increments import decide_increments
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
@@ -46,6 +48,10 @@ DIMENSION = "structure.dimension"
 # condense in the plane. In space the time grows with the fourth power, so the mesh is never made
 # finer than that of the case; meshes up to the last factor estimate its error.
 FEWEST_ELEMENTS, MOST_ELEMENTS, FINER_MESH = 7, 160, 4
+FLANK_NODES = "mesh.flank_nodes"
+# Nodes along the slot, relative to those of the case. The errors of other numbers follow from the
+# order of convergence, so they are not far away.
+SLOT_FACTORS = 0.5, 0.7, 1.0, 1.4, 2.0
 # Cells of a contact grid along one direction. The largest number holds in the plane; in space,
 # where each doubling takes four times as long, the limit is this factor times the case's number. No
 # grid is coarser than the case's by more than the last factor.
@@ -141,10 +147,39 @@ def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
         return ladders.flank_mesh(case, elements / written)
 
     def worn(elements: int) -> Numbers:
-        return section_wear(changed(section, settings(elements)))
+        return section_wear(changed(section, settings(elements)), resultants_of(case))
 
     order = MESH_ORDER
     return _climb("elements across the flank", numbers, most, settings, worn, allowed, order)
+
+
+def choose_slot(case: DovetailCase, allowed: float) -> Decision:
+    """Choose the fewest nodes along the slot that are accurate enough, or else the most offered."""
+    nodes = case.mesh.flank_nodes
+    compared = wear_along_slot(case) if case.structure.dimension == 3 else None
+    if compared is None:
+        return Decision({FLANK_NODES: nodes}, "no other number of nodes along the slot to compare")
+    own, coarser, share = compared
+    errors = {
+        f"{name} on the {flank}": abs(share * (coarser[flank][name] - own[flank][name])) / scale
+        for flank, quantities in scales(own).items()
+        for name, scale in quantities.items()
+        if scale > 0.0
+    }
+    worst = max(errors, key=lambda name: errors[name])
+    for factor in SLOT_FACTORS:
+        chosen = ladders.slot_mesh(case, factor)
+        finer = (chosen[FLANK_NODES][1] - 1) / (nodes[1] - 1)
+        error = errors[worst] * finer**-MESH_ORDER
+        if error <= allowed:
+            break
+    why = (
+        f"{chosen[FLANK_NODES][1]} nodes along the slot cause an error of {percent(error)}, of "
+        f"{percent(allowed)} allowed ({worst})"
+    )
+    why += "" if error <= allowed else ", the most offered"
+    probe = {"own": own, "coarser": coarser, "errors": errors}
+    return Decision(chosen, why, allowed, error, probe)
 
 
 def choose_grid(case: DovetailCase, allowed: float) -> Decision:

@@ -26,6 +26,7 @@ from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.translation import model_with, structure_loads
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
+from workflow.models.budget.probe_models import Resultants, along_slot
 from workflow.models.budget.probe_runs import (
     STEPS,
     TOLERANCE,
@@ -35,6 +36,7 @@ from workflow.models.budget.probe_runs import (
 from workflow.models.dovetail import FEW_INCREMENTS
 from workflow.models.structure import StructureLoads
 from workflow.models.wear import WearModel
+from workflow.shell.folders.cache import DiskStore
 
 # Settings of a probe run along the axes that it does not vary: cells across a flank, and nodes
 # across it. Differences along one axis hardly depend on them.
@@ -88,13 +90,13 @@ def _model(case: DovetailCase) -> WearModel:
     return model_with(case, dovetail_joint(case))
 
 
-def section_wear(case: DovetailCase) -> Numbers:
+def section_wear(case: DovetailCase, resultants: Resultants = "constant") -> Numbers:
     """Return the depth [mm] and the volume per length [mm²] worn from both bodies, by flank.
 
-    The loads are those of the unworn structure. Raises the errors of structure and contact, and
-    MethodFailed where nothing wears.
+    The loads are those of the unworn structure, or follow wear in ``every`` step. Raises the errors
+    of structure and contact, and MethodFailed where nothing wears.
     """
-    return _wearing(probe_run(_model(case), _structure(case)).worn)
+    return _wearing(probe_run(_model(case), _structure(case), resultants).worn)
 
 
 def coupled_wear(case: DovetailCase) -> tuple[Numbers, float]:
@@ -115,6 +117,27 @@ def _wearing(numbers: Numbers) -> Numbers:
     if not any(flank["volume"] > 0.0 for flank in numbers.values()):
         raise MethodFailed("nothing wears in a section of the case")
     return numbers
+
+
+def resultants_of(case: DovetailCase) -> Resultants:
+    """Return whether the loads of a case are those of the unworn structure or follow wear."""
+    return "constant" if case.coupling.resultants == "constant" else "every"
+
+
+def wear_along_slot(case: DovetailCase) -> tuple[Numbers, Numbers, float] | None:
+    """Return the wear with as many nodes along the slot as in the case, and with about half.
+
+    The last number is the share of the difference that is the error of the first. Returns None
+    where there are too few nodes.
+    """
+    meshes = along_slot(_model(case))
+    if meshes is None or meshes.own is None:
+        return None
+    own, coarser = (
+        probe_run(model, model.loads(DiskStore()), resultants_of(case))
+        for model in (meshes.own, meshes.model)
+    )
+    return _wearing(own.worn), coarser.worn, meshes.share
 
 
 # --- the profile along the slot -------------------------------------------------------------------

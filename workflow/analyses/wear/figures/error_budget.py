@@ -14,9 +14,9 @@ from workflow.analyses.wear.output.layout import RESULTS, WearContents
 from workflow.case.text.readable import percent
 from workflow.models.budget.names import PARTS
 from workflow.pictures.panels import legend_below, new_figure
-from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
+from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, YELLOW
 
-COLOURS = dict(zip(PARTS, (BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK), strict=True))
+COLOURS = dict(zip(PARTS, (BLUE, ORANGE, YELLOW, GREEN, PURPLE, SKY, AMBER, BLACK), strict=True))
 
 # Height of a bar in inches, and the largest error that is drawn: from there on, nothing is known.
 HEIGHT, MOST = 0.55, 1.0

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import pi, prod
 from typing import TYPE_CHECKING, Any
 
-from workflow.analyses.wear.approximations.ladders import flank_mesh
+from workflow.analyses.wear.approximations.ladders import flank_mesh, slot_mesh
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
 from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
@@ -79,7 +79,7 @@ def _warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[N
 
 
 def _settings(case: DovetailCase) -> dict[str, str]:
-    """Return the settings that reduce the errors of mesh and link: elements of half the size."""
+    """Return the settings that reduce the errors of meshes and link: elements of half the size."""
     mesh = flank_mesh(case, 2.0)
     nodes = f"mesh.flank_nodes: {list(mesh['mesh.flank_nodes'])}"
     finer = f"{nodes} and mesh.size: {mesh['mesh.size']:g} mm"
@@ -87,7 +87,8 @@ def _settings(case: DovetailCase) -> dict[str, str]:
         quadratic = case.mesh.described().of_order(2).refined(2.0)
         nodes_and_size = f"{list(quadratic.flank_nodes)} and mesh.size: {quadratic.size:g} mm"
         finer = f"mesh.order: 2 and mesh.flank_nodes: {nodes_and_size}"
-    return {"link": nodes, "mesh": finer}
+    along = list(slot_mesh(case, 2.0)["mesh.flank_nodes"])
+    return {"link": nodes, "mesh": finer, "slot": f"mesh.flank_nodes: {along}"}
 
 
 STRUCTURE = WearStructure(
