@@ -37,10 +37,10 @@ from sa_solver.types import Array, Frame
 # growth takes more nodes in space. The growth from fillets affects only the stress there.
 SIZE_GROWTH, FILLET_GROWTH = {1: 0.25, 2: 0.5}, 0.7
 # Share of the layers along the slot that divide the rounding at each end, where pressure and wear
-# are largest, and the least length that they divide, relative to the slot. The layers between grow
-# from the ends: at most this share of them as a cosine does, the rest is even.
-END_LAYERS, LEAST_END = 0.15, 0.03
-MOST_GRADED = 0.6
+# are largest. A rounding shorter than the least share of the slot counts as a sharp end, and of a
+# longer one than the first share only this part is divided. The layers between grow from the ends:
+# at most the last share of them as a cosine does, the rest is even.
+END_LAYERS, LEAST_END, MOST_GRADED = 0.15, 0.02, 0.45
 # Number of points along a curve from which distances are measured: many more than it usually has
 # nodes.
 SAMPLES = 200
@@ -471,15 +471,16 @@ def _layers(count: int, end: float) -> Array:
 
     ``end`` is the width of the rounding at each end, relative to the slot.
     """
-    at_end = min(ceil(END_LAYERS * count), (count - 1) // 2)
+    at_end = min(ceil(END_LAYERS * count), (count - 1) // 3) if end >= LEAST_END else 0
     between = count - 2 * at_end
-    end = min(max(end, LEAST_END), END_LAYERS) if at_end else 0.0
+    end = min(end, END_LAYERS) if at_end else 0.0
     low = np.linspace(0.0, end, at_end + 1)
     even = np.linspace(0.0, 1.0, between + 1)
     cosine = 0.5 * (1.0 - np.cos(np.pi * even))
     # The first layer between is no shorter than those at the ends.
     finer = 1.0 - low[1] / (1.0 - 2.0 * end) * between if at_end else 1.0
-    graded = min(max(finer / (1.0 - between * cosine[1]), 0.0), MOST_GRADED) if between > 2 else 0.0
+    steepest = 1.0 - between * cosine[1] if between > 2 else 1.0
+    graded = min(max(finer / steepest, 0.0), MOST_GRADED)
     middle = end + (1.0 - 2.0 * end) * (even + graded * (cosine - even))
     return np.concatenate([low, middle[1:], 1.0 - low[-2::-1]])[1:]
 

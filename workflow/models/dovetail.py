@@ -50,6 +50,9 @@ FEWEST_NODES = 3
 # Nodes across a flank, and round a fillet, of probe runs that compare meshes along the slot. With 5
 # to 11 nodes across, 13 and 27 nodes along the slot of the default differ by 2 to 4 % in depth.
 NODES_ACROSS, NOTCH_NODES = 7, 8
+# Layers of elements along the slot from which on they are compared with half as many, and otherwise
+# with twice as many: compared with three layers an estimate was 20 times too large.
+MANY_LAYERS = 10
 
 
 @dataclass(frozen=True)
@@ -276,10 +279,11 @@ class DovetailJoint:
 
     def along_slot(self) -> MeshesAlongSlot | None:
         """Return the joint in space with few nodes across the flanks and few increments."""
-        across, along = self.mesh.flank_nodes
-        coarser = 1 + self.order * max(1, round(0.5 * (along - 1) / self.order))
-        if self.dimension == 2 or not FEWEST_NODES <= coarser < along:
+        if self.dimension == 2:
             return None
+        across, along = self.mesh.flank_nodes
+        layers = (along - 1) // self.order
+        other = 1 + self.order * (layers // 2 if layers >= MANY_LAYERS else 2 * layers)
         across, size = min(across, NODES_ACROSS), max(self.mesh.size, self.geometry.flank_width)
         notch = min(self.mesh.notch, NOTCH_NODES)
 
@@ -287,8 +291,8 @@ class DovetailJoint:
             mesh = replace(self.mesh, flank_nodes=(across, nodes), size=size, notch=notch)
             return replace(self._in_few_increments(), mesh=mesh)
 
-        share = share_of_difference((coarser - 1) / (along - 1), MESH_ORDER)
-        return MeshesAlongSlot(meshed(along), meshed(coarser), share)
+        share = share_of_difference((other - 1) / (along - 1), MESH_ORDER)
+        return MeshesAlongSlot(meshed(along), meshed(other), share)
 
     def finer_mesh(self) -> FinerMesh:
         """Return the joint on a mesh of half the size and second order.

@@ -79,12 +79,12 @@ class FinerMesh:
 class MeshesAlongSlot(NamedTuple):
     """A structure with few nodes across its faces, on two meshes for probe runs.
 
-    ``own`` has as many nodes along the slot as the structure, ``coarser`` about half as many. The
-    error due to this number is ``share`` times the difference of their results.
+    ``own`` has as many nodes along the slot as the structure, ``other`` about half or twice as
+    many. The error due to this number is ``share`` times the difference of their results.
     """
 
     own: StructureModel
-    coarser: StructureModel
+    other: StructureModel
     share: float
 
 

@@ -150,12 +150,17 @@ def test_mesh_is_its_own_mirror_image(joint_and_mesh):
 
 
 def test_no_element_is_flat(joint_and_mesh):
+    """Heights are 0.4 of the shortest edge or more; elements are long along the slot only."""
     _, mesh = joint_and_mesh
     for body in mesh.bodies:
         volumes = np.abs(element_volumes(body.mesh))
         edges = body.mesh.p[:, body.mesh.edges]
-        longest = np.linalg.norm(edges[:, 0] - edges[:, 1], axis=0)[body.mesh.t2e].max(axis=0)
-        assert np.all(volumes > 1e-3 * longest**3)
+        lengths = np.linalg.norm(edges[:, 0] - edges[:, 1], axis=0)[body.mesh.t2e]
+        sides = body.mesh.p[:, body.mesh.facets].transpose(1, 2, 0)
+        areas = 0.5 * np.linalg.norm(np.cross(sides[1] - sides[0], sides[2] - sides[0]), axis=1)
+        heights = 3.0 * volumes / areas[body.mesh.t2f].max(axis=0)
+        assert np.all(heights > 0.4 * lengths.min(axis=0))
+        assert np.all(lengths.max(axis=0) < 25.0 * lengths.min(axis=0))
 
 
 def test_gap_is_flat_with_circular_edges_and_ends(joint_and_mesh):

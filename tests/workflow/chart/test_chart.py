@@ -283,7 +283,7 @@ def _check_steps(axis: Approximation, settings: list) -> None:
             "dovetail",
             {
                 *("grid", "tolerance", "method", "stepper", "dimension"),
-                *("coupling", "increments", "link", "mesh", "order"),
+                *("coupling", "increments", "link", "mesh", "slot", "order"),
             },
         ),
         ("specimens_flat", {"grid", "tolerance", "mesh", "order"}),

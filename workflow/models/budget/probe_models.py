@@ -197,11 +197,11 @@ def along_slot(model: WearModel) -> Neighbour | None:
         return None
     fewest = np.min([*_grids(model).values(), SLOT_CELLS], axis=0)
     settings = {"grid": tuple(fewest.tolist()), "method": "normal", "tolerance": TOLERANCE}
-    own, coarser = (
+    own, other = (
         _with(WearModel(meshed, model.contacts, model.wear), **settings)
-        for meshed in (meshes.own, meshes.coarser)
+        for meshed in (meshes.own, meshes.other)
     )
-    return Neighbour(coarser, meshes.share, own)
+    return Neighbour(other, meshes.share, own)
 
 
 def _contacts(model: WearModel) -> Mapping[str, Contact]:

@@ -89,7 +89,13 @@ def test_parts_add_up_and_unknown_ones_are_named() -> None:
     (written,) = arrays_of({"depth": ERROR}).values()
     known = dict(zip([*PARTS, "total"], written, strict=True))
     assert np.isnan(known.pop("increments"))
-    left = ERROR.parts | {"grid": 0.0, "coupling": 0.0, "solver": 0.0, "total": ERROR.total}
+    left = ERROR.parts | {
+        "slot": 0.0,
+        "grid": 0.0,
+        "coupling": 0.0,
+        "solver": 0.0,
+        "total": ERROR.total,
+    }
     assert known == {name: value for name, value in left.items() if value is not None}
 
 

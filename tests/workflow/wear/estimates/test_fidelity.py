@@ -111,7 +111,7 @@ def test_probe_runs_of_increments_are_of_second_order(case):
 # --- meshes and grids -----------------------------------------------------------------------------
 
 
-def by_nodes(case):
+def by_nodes(case, resultants="constant"):
     return both(1.0 + 1.0 / (case.mesh.flank_nodes[0] - 1))
 
 
@@ -129,11 +129,26 @@ def test_mesh_is_the_coarsest_within_its_share(case, monkeypatch, allowed, nodes
 def test_mesh_in_space_is_never_finer_than_written(case, monkeypatch):
     """Its error is still known, from finer meshes in the plane, and reported."""
     monkeypatch.setattr(decisions, "section_wear", by_nodes)
+    monkeypatch.setattr(decisions, "wear_along_slot", lambda case: (both(1.0), both(1.01), 1.0))
     decision = decisions.choose_mesh(in_space(case), 0.01)
     assert decision.value == (9, 9)
     assert not decision.met
-    assert decision.error == pytest.approx(1.0 / 8 / (1.0 + 1.0 / 32), rel=1e-9)
+    assert decision.error == pytest.approx(1.0 / 8 / (1.0 + 1.0 / 32) + 0.01, rel=1e-9)
     assert "the finest available" in decision.why
+
+
+@pytest.mark.parametrize(("allowed", "along", "left"), [(0.2, 5, 0.04), (0.08, 7, 0.01 * 64 / 36)])
+def test_layers_along_the_slot_are_chosen_apart_from_the_section(
+    case, monkeypatch, allowed, along, left
+):
+    """Half as many nodes change results by 3 % and have four times the error of all of them."""
+    monkeypatch.setattr(decisions, "section_wear", lambda case, resultants: both(1.0))
+    compared = both(1.0), both(1.03), -1.0 / 3.0
+    monkeypatch.setattr(decisions, "wear_along_slot", lambda case: compared)
+    decision = decisions.choose_mesh(in_space(case), allowed)
+    assert decision.value[1] == along
+    assert decision.error == pytest.approx(left, rel=1e-9)
+    assert decision.met
 
 
 def by_strips(case):
@@ -229,7 +244,7 @@ def test_drift_is_what_changes_depth_by_its_share(case):
 def cheap_probes(monkeypatch):
     """Replace probe runs by ones whose errors are known."""
 
-    def known(case):
+    def known(case, resultants="constant"):
         mesh, grid = case.mesh.flank_nodes[0], case.contact.grid[0]
         return both(1.0 + 0.5 / mesh**2 + 2.0 / grid**2)
 
@@ -278,7 +293,7 @@ def test_record_makes_the_case(plane_path, tmp_path):
 
 @pytest.mark.usefixtures("cheap_probes")
 def test_a_failed_probe_leaves_the_setting_unchanged(plane_path, monkeypatch):
-    def fail(case):
+    def fail(case, resultants="constant"):
         raise MethodFailed("no convergence")
 
     monkeypatch.setattr(decisions, "section_wear", fail)

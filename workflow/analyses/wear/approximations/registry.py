@@ -78,7 +78,6 @@ APPROXIMATIONS = (
         *("slot", "nodes along the slot", ladders.slots),
         entries=("mesh.flank_nodes",),
         order=convergence.MESH_ORDER,
-        decide=decisions.choose_slot,
         remedy=Remedy("slot", "mesh.flank_nodes"),
     ),
     Approximation("order", "order of the finite elements", ladders.orders, ("mesh.order",)),

@@ -26,8 +26,7 @@ MOST_FOR_DIMENSION = 0.9
 # fourth power of this root.
 SHARES = {
     "increments": 0.18,
-    "mesh": 0.28,
-    "slot": 0.10,
+    "mesh": 0.38,
     "grid": 0.12,
     "tolerance": 0.02,
     "stepper": 0.18,

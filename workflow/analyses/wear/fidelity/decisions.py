@@ -49,9 +49,10 @@ DIMENSION = "structure.dimension"
 # finer than that of the case; meshes up to the last factor estimate its error.
 FEWEST_ELEMENTS, MOST_ELEMENTS, FINER_MESH = 7, 160, 4
 FLANK_NODES = "mesh.flank_nodes"
-# Nodes along the slot, relative to those of the case. The errors of other numbers follow from the
-# order of convergence, so they are not far away.
-SLOT_FACTORS = 0.5, 0.7, 1.0, 1.4, 2.0
+# Share of the error of a mesh in space that its section may cause, and the numbers of nodes along
+# the slot that are offered, relative to that of the case.
+ACROSS = 0.75
+FEWER_ALONG = 0.5, 0.7, 1.0
 # Cells of a contact grid along one direction. The largest number holds in the plane; in space,
 # where each doubling takes four times as long, the limit is this factor times the case's number. No
 # grid is coarser than the case's by more than the last factor.
@@ -137,7 +138,10 @@ def choose_increments(case: DovetailCase, allowed: float) -> Decision:
 
 
 def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
-    """Choose the coarsest mesh, refined in proportion, whose section wears accurately enough."""
+    """Choose the coarsest mesh whose section wears accurately enough, and layers along the slot.
+
+    All of the mesh is refined with the section's, and in space the layers are then chosen.
+    """
     section, written = plane_section(case), case.mesh.flank_nodes[0] - 1
     in_space = case.structure.dimension == 3
     most = written if in_space else max(written, MOST_ELEMENTS)
@@ -149,37 +153,46 @@ def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
     def worn(elements: int) -> Numbers:
         return section_wear(changed(section, settings(elements)), resultants_of(case))
 
-    order = MESH_ORDER
-    return _climb("elements across the flank", numbers, most, settings, worn, allowed, order)
+    unit, part = "elements across the flank", ACROSS * allowed if in_space else allowed
+    across = _climb(unit, numbers, most, settings, worn, part, MESH_ORDER)
+    if not in_space:
+        return across
+    along = _choose_along(case, across.chosen, allowed - part)
+    return Decision(
+        {**across.chosen, **along.chosen},
+        f"{across.why}; {along.why}",
+        allowed,
+        (across.error or 0.0) + (along.error or 0.0),
+        {unit: across.probe, "nodes along the slot": along.probe},
+    )
 
 
-def choose_slot(case: DovetailCase, allowed: float) -> Decision:
-    """Choose the fewest nodes along the slot that are accurate enough, or else the most offered."""
-    nodes = case.mesh.flank_nodes
-    compared = wear_along_slot(case) if case.structure.dimension == 3 else None
-    if compared is None:
-        return Decision({FLANK_NODES: nodes}, "no other number of nodes along the slot to compare")
-    own, coarser, share = compared
+def _choose_along(case: DovetailCase, mesh: Settings, allowed: float) -> Decision:
+    """Choose the fewest nodes along the slot that are accurate enough, at most those of the case.
+
+    ``mesh`` are the other settings of the mesh.
+    """
+    across, along = mesh[FLANK_NODES][0], case.mesh.flank_nodes[1]
+    own, other, share = wear_along_slot(case)
     errors = {
-        f"{name} on the {flank}": abs(share * (coarser[flank][name] - own[flank][name])) / scale
+        f"{name} on the {flank}": abs(share * (other[flank][name] - own[flank][name])) / scale
         for flank, quantities in scales(own).items()
         for name, scale in quantities.items()
         if scale > 0.0
     }
     worst = max(errors, key=lambda name: errors[name])
-    for factor in SLOT_FACTORS:
-        chosen = ladders.slot_mesh(case, factor)
-        finer = (chosen[FLANK_NODES][1] - 1) / (nodes[1] - 1)
-        error = errors[worst] * finer**-MESH_ORDER
+    for factor in FEWER_ALONG:
+        nodes = ladders.slot_mesh(case, factor)[FLANK_NODES][1]
+        error = errors[worst] * ((along - 1) / (nodes - 1)) ** MESH_ORDER
         if error <= allowed:
             break
     why = (
-        f"{chosen[FLANK_NODES][1]} nodes along the slot cause an error of {percent(error)}, of "
+        f"{nodes} nodes along the slot cause an error of {percent(error)}, of "
         f"{percent(allowed)} allowed ({worst})"
     )
-    why += "" if error <= allowed else ", the most offered"
-    probe = {"own": own, "coarser": coarser, "errors": errors}
-    return Decision(chosen, why, allowed, error, probe)
+    why += "" if error <= allowed else ", the finest available"
+    probe = {"own": own, "other": other, "errors": errors}
+    return Decision({FLANK_NODES: (across, nodes)}, why, allowed, error, probe)
 
 
 def choose_grid(case: DovetailCase, allowed: float) -> Decision:
