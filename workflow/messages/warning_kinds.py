@@ -347,8 +347,8 @@ class WarningKind(MessageKind):
     CHOICE_INACCURATE = (
         "FS-W302",
         "The chosen settings do not meet the accuracy",
-        "Even the most accurate settings that may be chosen miss their share of the error. The run "
-        "uses them.",
+        "Even the most accurate settings that may be chosen leave a larger error, or the error of "
+        "one of them is unknown. The run uses them.",
         "Allow a larger error, or give the settings yourself.",
     )
     LONG_WEAR_STEPS = (

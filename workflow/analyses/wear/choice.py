@@ -63,11 +63,13 @@ def _since(begin: float) -> float:
 def record_of(decisions: Sequence[Decision], accuracy: float, begin: float) -> dict[str, Any]:
     """Return the decisions since ``begin`` that are to meet ``accuracy``, as data for JSON."""
     records = [decision.record for decision in decisions]
+    known = all(decision.met or decision.error is not None for decision in decisions)
+    estimated = sum(decision.error or 0.0 for decision in decisions)
     return {
         "accuracy": accuracy,
         "budget": {record["entry"]: record["allowed"] for record in records},
-        "estimated_error": sum(decision.error or 0.0 for decision in decisions),
-        "met": all(decision.met for decision in decisions),
+        "estimated_error": estimated,
+        "met": known and estimated <= accuracy * (1.0 + ROUNDING),
         "chosen": {k: value for decision in decisions for k, value in decision.chosen.items()},
         "decisions": records,
         "seconds": _since(begin),
@@ -91,7 +93,7 @@ def report_choice(
         for decision in record["decisions"]:
             reporter.say(f"chosen: {decision['entry']}: {decision['value']}: {decision['why']}")
         if record["met"]:
-            reporter.say(f"{error}, every share met; probes took {seconds:.1f} s")
+            reporter.say(f"{error}; probes took {seconds:.1f} s")
     if not record["met"]:
         missed = ", ".join(d["entry"] for d in record["decisions"] if not d["met"])
         reporter.warn(WarningKind.CHOICE_INACCURATE, f"{error}, shares not met: {missed}")

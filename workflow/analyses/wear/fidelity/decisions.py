@@ -157,7 +157,7 @@ def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
     across = _climb(unit, numbers, most, settings, worn, part, MESH_ORDER)
     if not in_space:
         return across
-    along = _choose_along(case, across.chosen, allowed - part)
+    along = _choose_along(case, across.chosen, max(allowed - (across.error or part), 0.0))
     return Decision(
         {**across.chosen, **along.chosen},
         f"{across.why}; {along.why}",
