@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from filelock import FileLock
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 # The attributes of numba's configuration are set at run time, which type checkers cannot see.
@@ -53,12 +52,14 @@ def compiling_in_turn(function: Callable[..., Any]) -> Iterator[None]:
     """Hold a lock during the first call of a compiled function in this process.
 
     Processes that need the function at the same time wait for the first of them and then load what
-    it has compiled, which takes up to 20 s. Without a lock, as in a folder that cannot be
-    written, each of them compiles.
+    it has compiled, which takes up to 20 s. Without a lock, as in a folder that cannot be written
+    or without the package ``filelock``, each of them compiles.
     """
     with ExitStack() as held:
         if not getattr(function, "signatures", True):
-            with suppress(OSError, NotImplementedError):
+            with suppress(OSError, NotImplementedError, ImportError):
+                from filelock import FileLock
+
                 CACHE_FOLDER.mkdir(parents=True, exist_ok=True)
                 held.enter_context(FileLock(CACHE_FOLDER / "compiling.lock"))
         yield
