@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 
 from fe_models.meshes.curved_face import edge_numbers
 from fe_models.meshes.structure_mesh import Body, mesh_edges, named_mesh, numbered_as
 from sa_solver.types import Array, Indices
 
 if TYPE_CHECKING:
+    import scipy.sparse as sp
     from skfem import MeshTet, MeshTri
 
 
@@ -76,6 +76,8 @@ def moments_on_halves(body: Body, facets: Indices) -> tuple[sp.csr_matrix, sp.cs
     φ are linear on the halves or quarters of the facets, which are given by number, and N quadratic
     on the whole ones. The matrices are ``(n, n)`` for all nodes of the elements of ``body``.
     """
+    import scipy.sparse as sp
+
     nodes, size = body.facet_nodes(facets), body.mesh.nvertices + len(mesh_edges(body.mesh))
     areas = np.linalg.norm(body.outward_of(facets), axis=1)
     shape = nodes.shape + nodes.shape[1:]

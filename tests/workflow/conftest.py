@@ -168,7 +168,7 @@ def put_kinetics(file: h5py.File, name: str, grid: Grid) -> None:
 
 def put_errors(file: h5py.File, name: str) -> None:
     """Write parts of the error of two results, one of them unknown."""
-    parts = np.array([0.004, np.nan, 0.006, 0.001, -0.003, 0.002, 0.0, 0.009])
+    parts = np.array([0.004, np.nan, 0.002, 0.006, 0.001, -0.003, 0.002, 0.0, 0.009])
     put(file.create_group(f"error/{name}"), depth=parts, volume=0.5 * parts)
     file[f"error/{name}"].attrs["accuracy"] = 0.05
 

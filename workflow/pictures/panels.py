@@ -28,6 +28,8 @@ Figures = Mapping[str, Callable[[h5py.File], Figure]]
 WIDTH_INCHES = 12.0
 # Padding at the sides of a figure [inches].
 PAD = 0.06
+# Characters in a row of a legend below a figure, and for the handle of each entry.
+ROW_WIDTH, HANDLE = 125, 7
 # Largest number of panels in a row; those of further interfaces begin new rows.
 MOST_COLUMNS = 3
 # Labelled multiples within a decade; further numbers would touch each other.
@@ -173,17 +175,22 @@ def legend_below(
     fontsize: float | None = None,
     title: str | None = None,
 ) -> None:
-    """Draw one legend of several panels below all of them, each name once; by default in a row."""
+    """Draw one legend of several panels below all of them, each name once.
+
+    By default it has as many rows as the width of a figure needs.
+    """
     named: dict[str, Any] = {}
     for axis in axes:
         handles, names = axis.get_legend_handles_labels()
         named |= dict(zip(names, handles, strict=True))
     if named:
+        widths = [len(name) + HANDLE for name in named]
+        fitting = len(named) if sum(widths) <= ROW_WIDTH else max(1, ROW_WIDTH // max(widths))
         figure.legend(
             named.values(),
             named.keys(),
             loc="outside lower center",
-            ncols=columns or len(named),
+            ncols=columns or fitting,
             fontsize=fontsize,
             title=title,
         )

@@ -25,8 +25,8 @@ def invoke(*arguments):
     return CliRunner().invoke(cli, [str(argument) for argument in arguments])
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["--version"]])
-def test_help_imports_nothing_heavy(arguments):
+def imported_by(arguments):
+    """Return the top-level modules that a command imports."""
     code = f"""
 import sys
 before = set(sys.modules)
@@ -40,8 +40,18 @@ print("\\nIMPORTED", *({{name.partition(".")[0] for name in set(sys.modules) - b
 """
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    imported = set(done.stdout.split("IMPORTED")[1].split())
-    assert imported - sys.stdlib_module_names <= LIGHT
+    return set(done.stdout.split("IMPORTED")[1].split())
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["--version"]])
+def test_help_imports_nothing_heavy(arguments):
+    assert imported_by(arguments) - sys.stdlib_module_names <= LIGHT
+
+
+@pytest.mark.parametrize("case", ["dovetail", "sphere_normal"])
+def test_check_imports_neither_solvers_nor_screens(case):
+    imported = imported_by(["check", str(CASES / f"{case}.yaml")])
+    assert not imported & {"scipy", "skfem", "numba", "gmsh", "matplotlib", "rich", "filelock"}
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def laid_out(figure: Figure) -> Figure:
 def problems(figure: Figure) -> list[str]:
     """Return the problems of a figure that has been laid out."""
     untitled = [] if figure.get_suptitle() else ["no title"]
-    checks = _empty, _unbounded, _unlabelled, _overlapping
+    checks = _empty, _unbounded, _unlabelled, _overlapping, _cut_off
     return [*untitled, *(problem for check in checks for problem in check(figure))]
 
 
@@ -127,6 +127,16 @@ def _overlapping(figure: Figure) -> Iterator[str]:
     for (one, box), (two, other) in combinations(boxes, 2):
         if one is not two and _overlap(box, other):
             yield f"texts overlap: {one.get_text()!r} and {two.get_text()!r}"
+
+
+def _cut_off(figure: Figure) -> Iterator[str]:
+    """Yield texts that end beyond the figure."""
+    inside = figure.bbox.padded(TOUCHING)
+    for text in _texts(figure):
+        box = Text.get_window_extent(text)
+        ends = inside.containsx(box.x0) and inside.containsx(box.x1)
+        if text.get_text().strip() and not (ends and inside.containsy(box.y0)):
+            yield f"a text is cut off: {text.get_text()!r}"
 
 
 def _overlap(one: Bbox, two: Bbox) -> bool:

@@ -16,7 +16,7 @@ from wear.joints.measured.measured_loops import measure_loops
 from workflow.analyses.wear.figures.wear import figures_of
 from workflow.chart import figures as chart_figures
 from workflow.commands import loops_figure
-from workflow.pictures.panels import new_figure
+from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import STYLE
 from workflow.sweep import figures as sweep_figures
 from workflow.sweep.table import varied_in
@@ -44,6 +44,17 @@ def test_checks_find_what_is_missing_or_illegible() -> None:
     assert drawn(at=0.5, title="") == ["no title"]
     assert drawn(at=0.5, label="x") == ["no label with a unit along x: cycles, x"]
     assert drawn() == ["texts overlap: 'a note' and 'another note'"]
+
+
+@pytest.mark.parametrize("count", [3, 10, 24])
+def test_legends_of_many_entries_have_several_rows(count: int) -> None:
+    figure = new_figure("Many lines", 4.0)
+    axis = figure.subplots()
+    for number in range(count):
+        axis.plot([0.0, 1.0], [0.0, number], label=f"line {number}" + number % 3 * " longer")
+    axis.set(xlabel="x [mm]", ylabel="cycles")
+    legend_below(figure, [axis])
+    assert problems(laid_out(figure)) == []
 
 
 @pytest.mark.slow

@@ -17,8 +17,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from filelock import lock_descriptor
-
 from workflow.errors import FolderInUse, UserError
 from workflow.shell.folders.store import check_regular
 
@@ -78,6 +76,8 @@ def _is_folder(root: Path) -> bool:
 
 def _opened(path: Path, patience: float) -> tuple[int, bool]:
     """Return the open lock file, and whether the system confirms that no other process holds it."""
+    from filelock import lock_descriptor
+
     end, removed = time.monotonic() + patience, 0
     while True:
         # The last holder may remove the empty folder between any two of these steps.

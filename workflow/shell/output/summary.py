@@ -11,7 +11,6 @@ from workflow.shell.analysis import Run
 from workflow.shell.folders.versions import versions
 from workflow.shell.output.measured import comparison_warnings, lines_of_measured
 from workflow.shell.output.quantities import SummaryQuantity
-from workflow.shell.terminal.reporter import TERMINAL
 
 # Number of stages whose seconds are shown at the end; the summary has all of them.
 MOST_STAGES = 3
@@ -23,6 +22,8 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     The intermediate files are removed. ``numbers`` are the results of the analysis, ``lines`` the
     same in short.
     """
+    from workflow.shell.terminal.reporter import TERMINAL
+
     reporter, measured = run.reporter, run.measured()
     reporter.warn_each(comparison_warnings(measured))
     seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
