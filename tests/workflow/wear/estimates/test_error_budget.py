@@ -85,7 +85,9 @@ def test_parts_add_up_and_unknown_ones_are_named() -> None:
     assert ERROR.total == pytest.approx(0.046)
     assert summary_of({"depth": ERROR})["depth"] == {**ERROR.parts, "total": ERROR.total}
     total, largest = sentences({"depth": ERROR})
-    assert "depth 4.6 %" in total
+    assert "depth at least 4.6 %" in total
+    complete, _ = sentences({"depth": ResultError({"mesh": 0.03})})
+    assert "depth 3.0 %" in complete
     assert all(part in largest for part in ("mesh 3.0 %", "steps 1.2 %", "unknown: increments"))
     (written,) = arrays_of({"depth": ERROR}).values()
     known = dict(zip([*PARTS, "total"], written, strict=True))

@@ -43,11 +43,14 @@ def _number(part: float | None) -> float:
 def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
     """Yield the error of every result, the largest parts of the worst one, and unknown parts.
 
-    The summary has all of them.
+    An error with an unknown part is at least that of the others. The summary has all parts.
     """
     if not errors:
         return
-    listed = ", ".join(f"{RESULTS[name]} {percent(error.total)}" for name, error in errors.items())
+    listed = ", ".join(
+        f"{RESULTS[name]} {'at least ' if error.unknown else ''}{percent(error.total)}"
+        for name, error in errors.items()
+    )
     yield f"estimated errors: {listed}"
     worst = max(errors, key=lambda name: errors[name].total)
     error = errors[worst]
