@@ -93,7 +93,7 @@ class NormalModes:
     def subtract(self, field: Array, coefficients: Array, out: Array) -> None:
         """Write ``field - motion(coefficients)`` to ``out``, all ``(nx, ny)``."""
         approach, tilt_x, tilt_y = _of_all_modes(self.free, coefficients)
-        np.subtract(field, (approach - tilt_y * self.x)[:, None] if tilt_y else approach, out=out)
+        np.subtract(field, self._along_x(approach, tilt_y), out=out)
         if tilt_x:
             out -= tilt_x * self.y
 
@@ -102,8 +102,7 @@ class NormalModes:
     ) -> None:
         """Subtract ``weight * motion(coefficients)`` from ``field`` in place, all ``(nx, ny)``."""
         approach, tilt_x, tilt_y = _of_all_modes(self.free, coefficients)
-        along_x = (approach - tilt_y * self.x)[:, None] if tilt_y else approach
-        field -= np.multiply(weight, along_x, out=scratch)
+        field -= np.multiply(weight, self._along_x(approach, tilt_y), out=scratch)
         if tilt_x:
             field -= np.multiply(weight, tilt_x * self.y, out=scratch)
 
@@ -168,6 +167,10 @@ class NormalModes:
         """Powers of x and of y in products of two free modes, and their signs, each ``(k, k)``."""
         i, j, signs = self._places
         return i[:, None] + i, j[:, None] + j, signs[:, None] * signs
+
+    def _along_x(self, approach: float, tilt_y: float) -> Array | float:
+        """Return the profile ``(nx, 1)`` along x, or a number where all cells move alike."""
+        return (approach - tilt_y * self.x)[:, None] if tilt_y else approach
 
     def _profiles(self, all_three: Sequence[float] | Array) -> tuple[Array, Array]:
         """Return the profiles along x and y of the motion with the coefficients of all modes."""

@@ -8,8 +8,8 @@ cache therefore has a folder for each version of all files of this package.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -47,19 +47,19 @@ def compiled(**options: Any) -> Callable[[Function], Function]:
     return compile_function
 
 
-@contextmanager
-def compiling_in_turn(function: Callable[..., Any]) -> Iterator[None]:
-    """Hold a lock during the first call of a compiled function in this process.
+def call_in_turn(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a compiled function, for the first time in this process under a lock.
 
     Processes that need the function at the same time wait for the first of them and then load what
     it has compiled, which takes up to 20 s. Without a lock, as in a folder that cannot be written
     or without the package ``filelock``, each of them compiles.
     """
+    if getattr(function, "signatures", True):
+        return function(*arguments)
     with ExitStack() as held:
-        if not getattr(function, "signatures", True):
-            with suppress(OSError, NotImplementedError, ImportError):
-                from filelock import FileLock
+        with suppress(OSError, NotImplementedError, ImportError):
+            from filelock import FileLock
 
-                CACHE_FOLDER.mkdir(parents=True, exist_ok=True)
-                held.enter_context(FileLock(CACHE_FOLDER / "compiling.lock"))
-        yield
+            CACHE_FOLDER.mkdir(parents=True, exist_ok=True)
+            held.enter_context(FileLock(CACHE_FOLDER / "compiling.lock"))
+        return function(*arguments)

@@ -163,6 +163,34 @@ def test_no_element_is_flat(joint_and_mesh):
         assert np.all(lengths.max(axis=0) < 25.0 * lengths.min(axis=0))
 
 
+def test_elements_of_many_layers_are_not_long_either(dovetail):
+    for body in dovetail.mesh((8, 19), 8.0, notch=24).bodies:
+        edges = body.mesh.p[:, body.mesh.edges]
+        longest = np.linalg.norm(edges[:, 0] - edges[:, 1], axis=0)[body.mesh.t2e].max(axis=0)
+        assert np.all(np.abs(element_volumes(body.mesh)) > 1e-3 * longest**3)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_layers_divide_the_rounding_of_the_ends(dovetail, order):
+    """A seventh of them at each end are equal, and end where the flat begins."""
+    along = 1 + 14 * order
+    (face, _) = dovetail.mesh((3, along), 8.0, order=order).interfaces
+    rows = np.unique(face.coordinates[:, 1].round(9))
+    layers = np.diff(rows)[::order] * order
+    assert layers == pytest.approx(layers[::-1], rel=1e-9)
+    assert layers[:3] == pytest.approx(dovetail.end_width / 3.0, rel=1e-9)
+    assert np.all(np.diff(layers[2:7]) > 0.0)
+
+
+@pytest.mark.parametrize("ends", [{"end_width": 0.1}, {"end_width": None, "end_radius": None}])
+def test_layers_of_sharp_ends_grow_towards_the_middle(dovetail, ends):
+    (face, _) = replace(dovetail, **ends).mesh((3, 9), 8.0).interfaces
+    layers = np.diff(np.unique(face.coordinates[:, 1].round(9)))
+    assert layers == pytest.approx(layers[::-1], rel=1e-9)
+    assert np.all(np.diff(layers[:4]) > 0.0)
+    assert layers.max() < 3.0 * layers.min()
+
+
 def test_gap_is_flat_with_circular_edges_and_ends(joint_and_mesh):
     """Check R - sqrt(R² - t²) at distances t into the arcs along the edges of the face."""
     dovetail, _ = joint_and_mesh

@@ -29,25 +29,31 @@ def doubled():
     return 2.0 * slope()
 """
 IN_TURN = """
-from kernels.compiled import compiling_in_turn
+from kernels.compiled import call_in_turn
 from kernels.doubled import doubled
 
-with compiling_in_turn(doubled):
-    doubled()
+call_in_turn(doubled)
 print(sum(doubled.stats.cache_misses.values()))
 """
+# Without a cache folder that is set from outside.
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
 ASKED = "from kernels.doubled import doubled; print(doubled())"
+
+
+def package_in(folder: Path) -> Path:
+    """Return a package whose function calls that of another file, which is not written yet."""
+    package = folder / "kernels"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    shutil.copy(compiled.__file__, package)
+    (package / "doubled.py").write_text(DOUBLED, encoding="utf-8")
+    return package
 
 
 @pytest.mark.slow
 def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
     """The file of the caller does not change, and numba alone would use its cache."""
-    package = tmp_path / "kernels"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    shutil.copy(compiled.__file__, package)
-    (package / "doubled.py").write_text(DOUBLED, encoding="utf-8")
-    kept_beside = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    package = package_in(tmp_path)
     for second, value in enumerate((3.0, 3.0, 5.0)):
         slope = package / "slope.py"
         slope.write_text(SLOPE.format(value=value), encoding="utf-8")
@@ -56,7 +62,7 @@ def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
         ended = subprocess.run(
             [sys.executable, "-c", ASKED],
             cwd=tmp_path,
-            env=kept_beside,
+            env=ENVIRONMENT,
             capture_output=True,
             text=True,
             check=True,
@@ -67,16 +73,11 @@ def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
 
 @pytest.mark.slow
 def test_of_processes_that_need_a_function_at_once_only_one_compiles_it(tmp_path):
-    package = tmp_path / "kernels"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    shutil.copy(compiled.__file__, package)
-    (package / "doubled.py").write_text(DOUBLED, encoding="utf-8")
+    package = package_in(tmp_path)
     (package / "slope.py").write_text(SLOPE.format(value=2.0), encoding="utf-8")
     command = [sys.executable, "-c", IN_TURN]
-    kept_beside = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     at_once = [
-        subprocess.Popen(command, cwd=tmp_path, env=kept_beside, stdout=subprocess.PIPE, text=True)
+        subprocess.Popen(command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True)
         for _ in range(3)
     ]
     compilations = [int(process.communicate()[0]) for process in at_once]

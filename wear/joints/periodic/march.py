@@ -28,7 +28,7 @@ import numpy as np
 from sa_solver import checks
 from sa_solver.types import Array
 from wear.joints.bouc_wen import BoucWen
-from wear.joints.compiled import compiling_in_turn
+from wear.joints.compiled import call_in_turn
 from wear.joints.elastic import ElasticLaw, settle_elastic
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
@@ -300,14 +300,12 @@ class PeriodicMarch:
         joints = len(driven.change)
         shares = min(self.threads, joints)
         if shares <= 1:
-            with compiling_in_turn(kernel):
-                kernel(period, driven)
+            call_in_turn(kernel, period, driven)
             return
         ends = [joints * share // shares for share in range(shares + 1)]
 
         def march(share: slice) -> None:
-            with compiling_in_turn(kernel):
-                kernel(period, DrivenJoints(*(part[share] for part in driven)))
+            call_in_turn(kernel, period, DrivenJoints(*(part[share] for part in driven)))
 
         with ThreadPoolExecutor(shares) as pool:
             list(pool.map(march, map(slice, ends[:-1], ends[1:])))

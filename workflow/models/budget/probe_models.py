@@ -52,15 +52,15 @@ class Probed:
 
 @dataclass(frozen=True)
 class Neighbour:
-    """A finer or coarser model; the error of the model is ``share`` times their difference.
+    """A finer or coarser ``model`` than ``own``.
 
-    The difference is relative to the finer of both: a ``share`` below 0 means that this is the
-    coarser one. It is compared with the model ``own``, by default that of all neighbours.
+    The error of ``own`` is ``share`` times their difference, which is relative to the finer of
+    both: a ``share`` below 0 means that ``model`` is the coarser one.
     """
 
+    own: WearModel
     model: WearModel
     share: float = 1.0
-    own: WearModel | None = None
 
 
 @dataclass(frozen=True)
@@ -93,17 +93,19 @@ class ProbeModels:
         own = _with(own, grid=grid, method="normal", tolerance=TOLERANCE)
         neighbours = {}
         if structure is not None and (finer := structure.finer_mesh()) is not None:
-            neighbours["mesh"] = Neighbour(replace(own, structure=finer.structure), finer.share)
+            neighbours["mesh"] = Neighbour(
+                own, replace(own, structure=finer.structure), finer.share
+            )
         if (slot := along_slot(model)) is not None:
             neighbours["slot"] = slot
         if (other := _other_grid(grid, of_model, line)) is not None:
             # The error of the model is smaller than that of the probe model by the last factor.
             refined, coarser = other[0] / grid[0], (grid[0] / across) ** GRID_ORDER
             share = share_of_difference(refined, GRID_ORDER) * coarser
-            neighbours["grid"] = Neighbour(_with(own, grid=other), share)
+            neighbours["grid"] = Neighbour(own, _with(own, grid=other), share)
         linked = all(contact.link == "corrected" for contact in _contacts(own).values())
         if not linked and not isinstance(model.structure, BodyPair):
-            neighbours["link"] = Neighbour(_with(own, link="corrected"))
+            neighbours["link"] = Neighbour(own, _with(own, link="corrected"))
         finer_cells = {name: (across / cells[0]) ** GRID_ORDER for name, cells in own_grids.items()}
         coupled = not isinstance(source, UncoupledSource)
         return cls(own, section is None, coupled, neighbours, finer_cells)
@@ -140,7 +142,7 @@ class ProbeModels:
             neighbour = self.neighbours[part]
             if part in ("mesh", "slot"):
                 mine, other = neighbour.own, neighbour.model
-                alike = first if mine is None else probe_run(mine, source_of(mine), kind)
+                alike = first if mine is self.own else probe_run(mine, source_of(mine), kind)
                 return _difference(alike, probe_run(other, source_of(other), kind), neighbour.share)
             # Unworn loads suffice for effects of the contacts.
             return _difference(own("constant"), probe_run(neighbour.model, shared), neighbour.share)
@@ -201,7 +203,7 @@ def along_slot(model: WearModel) -> Neighbour | None:
         _with(WearModel(meshed, model.contacts, model.wear), **settings)
         for meshed in (meshes.own, meshes.other)
     )
-    return Neighbour(other, meshes.share, own)
+    return Neighbour(own, other, meshes.share)
 
 
 def _contacts(model: WearModel) -> Mapping[str, Contact]:

@@ -28,14 +28,13 @@ from workflow.analyses.wear.budget.report import (
 )
 from workflow.analyses.wear.checks import run_errors
 from workflow.analyses.wear.model import wear_model
-from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.kinds import load_case
 from workflow.models.budget import probe_models, probe_runs
 from workflow.models.budget.budget import error_budget, followed
 from workflow.models.budget.names import PARTS
 from workflow.models.budget.outcome import InterfaceOutcome, peak_change
 from workflow.models.budget.parts import UNCERTAIN, ResultError, peak_lowered
-from workflow.models.budget.probe_models import ProbeModels, along_slot, late, scaled
+from workflow.models.budget.probe_models import ProbeModels, late, scaled
 from workflow.models.budget.probe_runs import STEPS, Numbers, probe_run
 from workflow.models.contact import Contact, Wear
 from workflow.models.loads import ContactFace, LoadSource
@@ -238,42 +237,6 @@ def test_advice_on_mesh_and_link_helps(part, own, dovetail) -> None:
     assert not set(taken) & {*COARSE, *own}
     after, _ = dovetail(*COARSE, *own, *taken)
     assert abs(after - true) < 0.8 * abs(before - true)
-
-
-@pytest.mark.parametrize(
-    ("own", "other"), [((9, 13), 25), ((9, 21), 11), ((21, 27), 13), ((5, 3), 5)]
-)
-def test_meshes_along_the_slot_differ_in_nothing_else(own, other) -> None:
-    asked = ["structure.skew=10 deg", f"mesh.flank_nodes={list(own)}"]
-    joint = dovetail_joint(load_case(CASES / "dovetail.yaml", asked))
-    meshes = joint.along_slot()
-    assert meshes is not None
-    assert meshes.own.mesh.flank_nodes == (min(own[0], 7), own[1])
-    assert meshes.other.mesh.flank_nodes == (min(own[0], 7), other)
-    assert replace(meshes.other, mesh=meshes.own.mesh) == meshes.own
-    assert meshes.own.geometry == joint.geometry
-    assert meshes.share == pytest.approx(1.0 / (1.0 - ((own[1] - 1) / (other - 1)) ** 2), rel=1e-12)
-    assert joint.section().along_slot() is None
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ends", [3.0, 0.2])
-def test_error_along_the_slot_is_true_within_a_factor_of_three(ends) -> None:
-    """Round and nearly sharp ends are compared with four times as many layers."""
-    asked = [f"structure.end_width={ends}", "mesh.flank_nodes=[9, 13]", "contact.grid=[48, 96]"]
-    model = wear_model(load_case(CASES / "dovetail.yaml", asked))
-    meshes = along_slot(model)
-    assert meshes is not None
-    own, coarser = (probe_run(m, loads_of(m), "every") for m in (meshes.own, meshes.model))
-    estimated = meshes.share * (own.worn["extrados"]["depth"] - coarser.worn["extrados"]["depth"])
-    mesh = model.structure.mesh
-    fine = replace(model.structure, mesh=replace(mesh, flank_nodes=(9, 49)))
-    few, many = (
-        probe_run(m, loads_of(m), "every").worn["extrados"]["depth"]
-        for m in (model, replace(model, structure=fine))
-    )
-    assert few / many - 1.0 > 0.02
-    assert 1.0 / 3.0 < (estimated / own.worn["extrados"]["depth"]) / (few / many - 1.0) < 3.0
 
 
 @pytest.mark.slow

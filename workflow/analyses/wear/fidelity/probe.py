@@ -132,7 +132,6 @@ def wear_along_slot(case: DovetailCase) -> tuple[Numbers, Numbers, float]:
     """
     meshes = along_slot(_model(case))
     assert meshes is not None
-    assert meshes.own is not None
     own, other = (
         probe_run(model, model.loads(DiskStore()), resultants_of(case))
         for model in (meshes.own, meshes.model)
