@@ -13,12 +13,20 @@ from numpy.typing import NDArray
 
 from fe_models.joints.condensation import Keep, made_anew
 from fe_models.joints.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
-from fe_models.joints.joint import JointResolvent, JointStiffness, join, join_halves
+from fe_models.joints.joint import JointStiffness, Resolvent, join, join_halves
+from fe_models.joints.sparse_joint import (
+    SparseBody,
+    SparseResolvent,
+    expected_rho,
+    relative_displacements,
+)
 from fe_models.meshes.structure_mesh import Face, Interface, StructureMesh, in_space
-from fe_models.solvers.pardiso import sharing
+from fe_models.mirrored_bodies import Halves, mirrored_halves
+from fe_models.solvers.memory import available_bytes, full_matrices_bytes
+from fe_models.solvers.pardiso import in_parallel
+from fe_models.solvers.symmetry import Mirror
 from fe_models.supported_body import SupportedBody
 from sa_solver.cycles.increments import dissipated, in_rows, mean_of_ends
-from sa_solver.transforms.threads import run_parallel
 from sa_solver.types import Array, Indices, LoadHistory, Progress, Tally, resultants, unseen
 
 T = TypeVar("T")
@@ -170,9 +178,31 @@ class Structure:
         faces_1 = sum(len(interface.nodes_1) for interface in self.mesh.interfaces)
         return held[: self.dimension * faces_1], held[self.dimension * faces_1 :]
 
+    def resolvent(
+        self,
+        progress: Progress = unseen,
+        keep: Keep = made_anew,
+        memory: float | None = None,
+    ) -> Resolvent:
+        """Return the resolvent of the joint, which the friction solver needs.
+
+        It has full matrices, which are fast, if these fit into ``memory`` [bytes], by default what
+        is free. Otherwise it has the sparse factors of all bodies. Bodies of second-order elements
+        always have full matrices. For ``progress`` and ``keep`` see :meth:`condense`.
+        """
+        done = self._steps(progress)
+        halves = self._halves(done, keep)
+        size, limit = len(self.held[1]), available_bytes() if memory is None else memory
+        if full_matrices_bytes(size, len(self.bodies), halves is not None) > limit:
+            sparse = [body.uncondensed() for body in self.bodies]
+            found = [body for body in sparse if body is not None]
+            if len(found) == len(sparse):
+                return self._sparse_resolvent(found)
+        return self._condensed(done, keep, None, halves).resolvent()
+
     def condense(
         self,
-        like: JointResolvent | None = None,
+        like: Resolvent | None = None,
         progress: Progress = unseen,
         keep: Keep = made_anew,
     ) -> JointStiffness:
@@ -187,55 +217,70 @@ class Structure:
         keep
             Store that may return bodies condensed before.
         """
-        held_1, held_2 = self.held
-        projection, held = self.projection, held_1.any() or held_2.any()
-        if like is None and projection is None and not held and len(self.bodies) == 2:
-            halves = self._condense_halves(progress, keep)
-            if halves is not None:
-                return halves
-        if held:
-            every = sp.identity(len(held_2), format="csr") if projection is None else projection
-            projection = every[~held_2][:, ~held_1]
         done = self._steps(progress)
-        condensed = self.run_parallel(*(partial(body.condense, done, keep) for body in self.bodies))
-        among_free = np.cumsum(~np.concatenate(self.held)) - 1
-        pairs = zip(self.bodies, self.places, strict=True)
-        places = [among_free[place[~body.held]] for body, place in pairs]
-        joint = join(condensed, projection, places, held_2, like)
-        done()
-        return joint
+        halves = self._halves(done, keep) if like is None else None
+        return self._condensed(done, keep, like, halves)
 
     def _steps(self, progress: Progress) -> Tally:
         """Return the step counter of a condensation: two steps per body, and one for the joint."""
         return Tally(progress, 2 * len(self.bodies) + 1)
 
-    def _condense_halves(self, progress: Progress, keep: Keep) -> JointStiffness | None:
-        """Condense by a mirror symmetry of two bodies, or return None if there is none."""
-        body_1, body_2 = self.bodies
-        for axis in body_1.elastic.body.axes:
-            mirrors = body_1.mirror(axis), body_2.mirror(axis)
-            if mirrors[0] is None or mirrors[1] is None:
-                continue
-            on_1 = body_1.on_interface(mirrors[0])
-            if on_1 is None or on_1 != body_2.on_interface(mirrors[1]):
-                continue
-            done = self._steps(progress)
-            halves = self.run_parallel(
-                partial(body_1.halves, mirrors[0], on_1, done, keep),
-                partial(body_2.halves, mirrors[1], on_1, done, keep),
-            )
-            if halves[0] is not None and halves[1] is not None:
-                condensed = self.run_parallel(*halves[0], *halves[1])
-                joint = join_halves(condensed[:2], condensed[2:], on_1)
-                done()
-                return joint
+    def _condensed(
+        self, done: Tally, keep: Keep, like: Resolvent | None, halves: Halves | None
+    ) -> JointStiffness:
+        """Return the joint of condensed bodies, or of their ``halves``."""
+        if halves is not None:
+            condensed = self.run_parallel(*halves.of_1, *halves.of_2)
+            joint = join_halves(condensed[:2], condensed[2:], halves.mirror)
+        else:
+            jobs = (partial(body.condense, done, keep) for body in self.bodies)
+            condensed = self.run_parallel(*jobs)
+            among_free = np.cumsum(~np.concatenate(self.held)) - 1
+            pairs = zip(self.bodies, self.places, strict=True)
+            places = [among_free[place[~body.held]] for body, place in pairs]
+            joint = join(condensed, self._free_projection, places, self.held[1], like)
+        done()
+        return joint
+
+    @property
+    def _free_projection(self) -> sp.csr_matrix | None:
+        """Projection of the free displacements of faces 1, or None if all faces match."""
+        held_1, held_2 = self.held
+        projection = self.projection
+        if not held_1.any() and not held_2.any():
+            return projection
+        every = sp.identity(len(held_2), format="csr") if projection is None else projection
+        return every[~held_2][:, ~held_1]
+
+    def _halves(self, done: Tally, keep: Keep) -> Halves | None:
+        """Return what condenses two bodies in halves of a mirror symmetry, or None without one."""
+        held_1, held_2 = self.held
+        if self.projection is not None or held_1.any() or held_2.any() or len(self.bodies) != 2:
+            return None
+        return mirrored_halves(*self.bodies, self.run_parallel, done, keep)
+
+    def _sparse_resolvent(self, bodies: Sequence[SparseBody]) -> SparseResolvent:
+        """Return the resolvent of all bodies as one sparse system."""
+        free = [place[~body.held] for body, place in zip(self.bodies, self.places, strict=True)]
+        relative = relative_displacements(self._free_projection, self.held, np.concatenate(free))
+        rho = expected_rho(bodies, self.mesh.interfaces)
+        rigid_modes = sum(body.rigid_modes for body in self.bodies)
+        return SparseResolvent(bodies, relative, rho, rigid_modes, self._mirror())
+
+    def _mirror(self) -> Mirror | None:
+        """Return a mirror of the free displacements of all bodies, if their nodes have one."""
+        for axis in self.bodies[0].elastic.body.axes:
+            mirrors = [body.mirror(axis) for body in self.bodies]
+            found = [mirror for mirror in mirrors if mirror is not None]
+            if len(found) == len(mirrors):
+                return Mirror.beside(found)
         return None
 
     def run_parallel(self, *jobs: Callable[[], T]) -> list[T]:
         """Run jobs that each factorise a body, in parallel if memory surely suffices."""
         if sum(body.elastic.size for body in self.bodies) > MOST_AT_ONCE:
             return [job() for job in jobs]
-        return run_parallel(sharing(jobs))
+        return in_parallel(jobs)
 
     @property
     def projection(self) -> sp.csr_matrix | None:

@@ -16,6 +16,7 @@ from fe_models.elasticity.body import ElasticBody
 from fe_models.elasticity.recovery import StressRecovery
 from fe_models.interface_frames import frame_rotation, interface_displacements
 from fe_models.joints.condensation import Condensed, Keep, condense_body, made_anew, renamed
+from fe_models.joints.sparse_joint import SparseBody
 from fe_models.loads.constraints import Constraints
 from fe_models.loads.rigid_motions import rigid_body_modes, rigid_motions
 from fe_models.meshes.structure_mesh import Body, Interface
@@ -155,6 +156,12 @@ class SupportedBody:
         condensed = condense_body(stiffness, loads, self._interface, keep)
         done()
         return condensed if self._springs is None else self._springs.removed(*condensed)
+
+    def uncondensed(self) -> SparseBody | None:
+        """Return the body without condensing it, or None for a body with a trace."""
+        if self._springs is not None:
+            return None
+        return SparseBody(*self._reduced(), self._interface)
 
     def mirror(self, axis: int) -> Mirror | None:
         """Return the mirror of the free displacements across a global ``axis``.
@@ -351,9 +358,14 @@ class SupportedBody:
         return SectorRecovery(self.elastic, self.free_facets, matched)
 
     @property
+    def rigid_modes(self) -> int:
+        """Number of rigid motions that supports leave free."""
+        return int(self._rigid.shape[1])
+
+    @property
     def is_held(self) -> bool:
         """True if supports alone hold the body."""
-        return self._rigid.shape[1] == 0
+        return self.rigid_modes == 0
 
     @property
     def clamped(self) -> Indices:

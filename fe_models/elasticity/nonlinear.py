@@ -26,7 +26,7 @@ from fe_models.elasticity.relinearised import (
 )
 from fe_models.elasticity.total_lagrangian import TotalLagrangian, rotation_angle
 from fe_models.joints.friction import FrictionalJoint, FrictionState
-from fe_models.joints.joint import JointResolvent
+from fe_models.joints.joint import Resolvent
 from fe_models.motion import deformation
 from fe_models.structure import Structure
 from sa_solver.types import Array, resultant_change
@@ -87,7 +87,7 @@ class NonlinearCheck:
 
 def check_nonlinearity(
     structure: Structure,
-    like: JointResolvent,
+    like: Resolvent,
     friction: float | Array,
     amplitudes: Array,
     gap: Array,
@@ -162,7 +162,7 @@ def _slide(structure: Structure, slip: Array) -> float:
 def _newton(
     structure: Structure,
     linear: FrictionState,
-    like: JointResolvent,
+    like: Resolvent,
     friction: float | Array,
     amplitudes: Array,
     gap: Array,

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from fe_models.elasticity.total_lagrangian import TotalLagrangian
 from fe_models.joints.friction import FrictionState
-from fe_models.joints.joint import JointResolvent
+from fe_models.joints.joint import Resolvent
 from fe_models.loads.rigid_motions import rigid_motions
 from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.structure import Structure
@@ -40,7 +40,7 @@ class PrestressedStructure(Structure):
     displacements: Displacements
     share: Array
 
-    def condense_path(self, like: JointResolvent) -> JointResolvent:
+    def condense_path(self, like: Resolvent) -> Resolvent:
         """Return the joint for a whole load path; ``like`` is that of the linear structure.
 
         A body held by contact alone has a negative stiffness to rigid motions in a centrifugal

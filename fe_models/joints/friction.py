@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fe_models.joints.joint import JointResolvent
+from fe_models.joints.joint import Resolvent
 from fe_models.meshes.structure_mesh import AXES, in_space
 from fe_models.solvers.blas_threads import one_thread
 from sa_solver import checks
@@ -85,7 +85,7 @@ class FrictionalJoint:
     0.000 N, 0.100 mm apart
     """
 
-    def __init__(self, joint: JointResolvent, friction: float | Array) -> None:
+    def __init__(self, joint: Resolvent, friction: float | Array) -> None:
         """Store the joint and its friction. Raises InputError for a µ below 0 or not finite."""
         if np.ndim(friction) == 0:
             friction = checks.number("friction", friction, least=0.0)
@@ -224,9 +224,7 @@ class _Problem:
     product in double precision. This takes half the time, and the final result is exact.
     """
 
-    def __init__(
-        self, joint: JointResolvent, friction: float | Array, increment: _Increment
-    ) -> None:
+    def __init__(self, joint: Resolvent, friction: float | Array, increment: _Increment) -> None:
         self._joint, self._rho, self._friction = joint, joint.rho, friction
         self._gap, self._previous = increment.gap, increment.previous
         forces, self._offset = increment.load

@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import scipy.linalg as sl
@@ -118,9 +118,38 @@ class JointStiffness:
         return JointResolvent(inverse, rho, loads, self.rigid_modes)
 
 
+class Resolvent(Protocol):
+    """Protocol of (H + ρ)⁻¹ of a joint, with all that the friction solver needs of the joint.
+
+    ``rho`` is ρ [N/mm], ``loads`` ``(d n, cases)`` and ``rigid_modes`` are those of
+    :class:`JointStiffness`, and ``widest`` is the number of unknowns of the largest matrix in a
+    product.
+    """
+
+    @property
+    def rho(self) -> float: ...
+
+    @property
+    def loads(self) -> Array: ...
+
+    @property
+    def rigid_modes(self) -> int: ...
+
+    @property
+    def widest(self) -> int: ...
+
+    def product(self, vectors: Array) -> Array:
+        """Return (H + ρ)⁻¹ times ``vectors`` ``(d n,)`` or ``(d n, m)``."""
+        ...
+
+    def rounded_product(self, vector: Array) -> Array:
+        """Return the product with one vector ``(d n,)`` in single precision, which is faster."""
+        ...
+
+
 @dataclass(frozen=True)
 class JointResolvent:
-    """Resolvent of a joint, with all that the friction solver needs of the joint.
+    """Resolvent of a joint as a full matrix.
 
     ``inverse`` ``(d n, d n)`` is (H + ρ)⁻¹ [mm/N] with ``rho`` ρ [N/mm]; ``loads`` and
     ``rigid_modes`` are those of the joint.
@@ -171,7 +200,7 @@ def join(
     projection: sp.csr_matrix | None = None,
     places: Sequence[Indices] | None = None,
     held: NDArray[np.bool_] | None = None,
-    like: JointResolvent | None = None,
+    like: Resolvent | None = None,
 ) -> JointStiffness:
     """Join condensed ``bodies``, which need to be held only when all faces stick.
 

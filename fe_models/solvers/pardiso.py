@@ -22,13 +22,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from sa_solver.errors import ConvergenceError
+from sa_solver.transforms.threads import run_parallel
 from sa_solver.types import Array, Indices
 
 T = TypeVar("T")
 
 ANALYSE, FACTORISE, SOLVE, RELEASE = 11, 22, 33, -1
 # Positions in PARDISO's table of parameters, counted from zero; the last three are outputs.
-NO_DEFAULTS, ORDERING, ZERO_BASED, SCHUR = 0, 1, 34, 35
+NO_DEFAULTS, ORDERING, SINGLE, ZERO_BASED, SCHUR = 0, 1, 27, 34, 35
 ANALYSIS_PEAK, ANALYSIS_KEPT, FACTORS = 14, 15, 16
 NESTED_DISSECTION = 2
 # MKL's mode of reproducible results with its fastest kernels; otherwise two solutions with two
@@ -42,6 +43,9 @@ PLACE_VARIABLE = "PYPARDISO_MKL_RT"
 # PARDISO's number for real symmetric positive definite matrices.
 POSITIVE_DEFINITE = 2
 KILOBYTE = 1024
+# Fewest threads of a factorisation beside others: with one each, PARDISO's analysis has crashed the
+# process at random (sfinit, MKL 2026.2), with two never. Both take the same time on two cores.
+FEWEST_THREADS = 2
 
 
 class PardisoError(ConvergenceError):
@@ -73,35 +77,40 @@ def threads() -> int:
     return 1 if mkl is None else int(mkl.MKL_Get_Max_Threads())
 
 
-def sharing(jobs: Sequence[Callable[[], T]]) -> list[Callable[[], T]]:
-    """Return jobs to run in parallel threads, among which MKL's threads are divided.
+def in_parallel(jobs: Sequence[Callable[[], T]]) -> list[T]:
+    """Run jobs in parallel threads, among which MKL's threads are divided.
 
     A factorisation of 50,000 unknowns gains little from a second thread, but two of them in
-    parallel run almost twice as fast.
+    parallel run almost twice as fast. With one thread of MKL, jobs run one after the other.
     """
+    mkl, count = library(), threads()
+    if mkl is not None and count < FEWEST_THREADS:
+        return [job() for job in jobs]
+    share = max(count // max(len(jobs), 1), FEWEST_THREADS)
 
     def with_share(job: Callable[[], T]) -> T:
-        mkl = library()
         if mkl is None:
             return job()
-        before = mkl.MKL_Set_Num_Threads_Local(max(mkl.MKL_Get_Max_Threads() // len(jobs), 1))
+        before = mkl.MKL_Set_Num_Threads_Local(share)
         try:
             return job()
         finally:
             mkl.MKL_Set_Num_Threads_Local(before)
 
-    library()  # Load MKL here, in the main thread.
-    return [partial(with_share, job) for job in jobs]
+    return run_parallel([partial(with_share, job) for job in jobs])
 
 
 class Pardiso:
     """Matrix analysed by PARDISO, whose memory is released with the object.
 
     After :meth:`factorise`, call the object with right-hand sides. With ``kept`` unknowns,
-    :meth:`schur` returns their Schur complement, and there are no factors to solve with.
+    :meth:`schur` returns their Schur complement, and there are no factors to solve with. Factors in
+    ``single`` precision take half the memory and the time.
     """
 
-    def __init__(self, matrix: sp.csr_matrix, kept: Indices | None = None) -> None:
+    def __init__(
+        self, matrix: sp.csr_matrix, kept: Indices | None = None, single: bool = False
+    ) -> None:
         mkl = library()
         if mkl is None:
             raise PardisoError("PARDISO is not installed")
@@ -109,11 +118,12 @@ class Pardiso:
             raise PardisoError("the matrix has an empty row")  # PARDISO would crash.
         upper = _upper(matrix)
         self._size = matrix.shape[0]
-        self._values = upper.data.astype(float)
+        self._values = upper.data.astype(np.float32 if single else np.float64)
         self._pointers, self._columns = upper.indptr.astype("i4"), upper.indices.astype("i4")
         self._marked = np.zeros(self._size, np.int32)
         parameters = np.zeros(64, np.int32)
         parameters[[NO_DEFAULTS, ORDERING, ZERO_BASED]] = 1, NESTED_DISSECTION, 1
+        parameters[SINGLE] = single
         if kept is not None:
             parameters[SCHUR] = 1
             self._marked[kept] = 1
@@ -143,10 +153,12 @@ class Pardiso:
 
     def __call__(self, rhs: Array) -> Array:
         """Solve for right-hand sides ``(n,)`` or ``(n, m)``."""
-        columns = np.asfortranarray(rhs, dtype=float).reshape(self._size, -1, order="F")
+        columns = np.asfortranarray(rhs, dtype=self._values.dtype)
+        columns = columns.reshape(self._size, -1, order="F")
         solution = np.zeros_like(columns)
-        self._call(SOLVE, columns, solution)
-        return np.ascontiguousarray(solution).reshape(rhs.shape)
+        if columns.size:
+            self._call(SOLVE, columns, solution)
+        return np.ascontiguousarray(solution, dtype=np.float64).reshape(rhs.shape)
 
     def schur(self) -> Array:
         """Factorise and return the dense Schur complement of the ``kept`` unknowns, in order."""

@@ -12,6 +12,7 @@ Source: Zingoni 2005, Finite Elements in Analysis and Design 41, 615.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -75,6 +76,13 @@ class Mirror:
         """Both bases side by side ``(n, n)``, and the transpose."""
         both = sp.hstack(self.bases, format="csr")
         return both, both.T.tocsr()
+
+    @classmethod
+    def beside(cls, mirrors: Sequence[Mirror]) -> Mirror:
+        """Return the mirror of the unknowns of several mirrors, one after the other."""
+        starts = np.cumsum([0, *(len(mirror.partner) for mirror in mirrors)])
+        partners = [start + m.partner for start, m in zip(starts, mirrors, strict=False)]
+        return cls(np.concatenate(partners), np.concatenate([m.sign for m in mirrors]))
 
     def restricted(self, unknowns: Indices) -> Mirror | None:
         """Return the mirror of some unknowns, in their order, or None if it maps any elsewhere."""

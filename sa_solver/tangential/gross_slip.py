@@ -34,9 +34,10 @@ while it slides by tens of µm."""
 SHARE_CHECKED = 0.5
 """Share of µP, or of its moment, above which the largest shear load is computed."""
 
-ACCURACY = 1e-6
-"""Relative error of the energy, and error of the direction [rad], at which the search ends. The
-direction of shear solved to 1e-8 is accurate to about 1e-7."""
+ACCURACY, PER_TOLERANCE = 1e-6, 10.0
+"""Relative error of the energy, and error of the direction [rad], at which the search ends. It is
+at least ten times the tolerance of the contact problems, because the direction of shear solved to
+1e-8 is accurate to about 1e-7."""
 
 LOOSEST = 1e-3
 LOOSER = 0.01
@@ -89,7 +90,7 @@ class GrossSlip:
     Attributes
     ----------
     error
-        Error of the last contact problem solved: see :data:`ACCURACY`. Poisson's ratio couples
+        Error of the last contact problem solved, of energy and direction. Poisson's ratio couples
         both directions of shear, so that no direction of sliding dissipates energy along x or y
         only. With the rule ``energies`` an error of the direction may then remain, while the total
         energy is met.
@@ -98,16 +99,19 @@ class GrossSlip:
     creeps
         Whether the contact dissipates more than the given energy without any motion. The force is
         then below the sliding force and determines the state.
+    accuracy
+        Error at which the search ends: see :data:`ACCURACY`.
     """
 
     error: float
     missing: float
     creeps: bool
+    accuracy: float = ACCURACY
 
     @property
     def message(self) -> str:
         """Message that says what is wrong and what to try; empty if the energy is met."""
-        if self.missing <= ACCURACY:
+        if self.missing <= self.accuracy:
             return ""
         return (
             f"the sliding contact dissipates an energy off by {self.missing:.1e} of that of its "
@@ -158,6 +162,7 @@ def gross_slip(
     total = float(energy.sum())
     wanted = angle = _angle(force if direction == "force" else np.sqrt(energy.clip(0.0)))
     length = max(0.0, total + stored) / carried
+    accuracy = max(ACCURACY, PER_TOLERANCE * tolerance)
     inner, by_length, by_angle = LOOSEST, _Secant(carried), _Secant(1.0)
     if near is not None and near.any():
         inner = LOOSER * LOOSEST
@@ -169,14 +174,14 @@ def gross_slip(
         longer, turned = by_length.change(length, missing), by_angle.change(angle, turn)
         turn = float(np.clip(angle + turn, 0.0, 0.5 * np.pi)) - angle
         change = max(abs(missing) / total, abs(turn))
-        if change <= ACCURACY and inner <= tolerance:
+        if change <= accuracy and inner <= tolerance:
             break
         inner = max(tolerance, LOOSER * min(change, inner))
         length = max(0.0, length + longer)
         angle = float(np.clip(angle + turned, 0.0, 0.5 * np.pi))
     lacking = abs(missing) / total
-    creeps = length == 0.0 and missing < -ACCURACY * total
-    return GrossSlip(max(lacking, abs(wanted - measured)), lacking, creeps)
+    creeps = length == 0.0 and missing < -accuracy * total
+    return GrossSlip(max(lacking, abs(wanted - measured)), lacking, creeps, accuracy)
 
 
 class _Secant:

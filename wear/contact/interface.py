@@ -344,7 +344,7 @@ class InterfaceContact:
             self._frictional = FrictionalContact(
                 self._contact.half_space,
                 friction,
-                self.settings.tolerance,
+                self.settings.shear_tolerance,
                 self.settings.gross_slip,
             )
         return self._frictional

@@ -15,6 +15,9 @@ from wear.laws import WearLaw
 from wear.steps.steppers import Stepper
 from wear.steps.stepping import WearingContact, WearState
 
+# Tolerance of shear over that of pressures, and its lower bound.
+SHEAR_SHARE, TIGHTEST = 0.01, 1e-8
+
 
 @dataclass(frozen=True)
 class InterfaceSettings:
@@ -55,7 +58,7 @@ class InterfaceSettings:
         bodies (:mod:`wear.contact.link`), where the loads contain nodal forces and displacements.
         "half_space": they are not.
     tolerance
-        Relative tolerance of the contact solver.
+        Relative tolerance of pressures. Shear is solved more tightly: :attr:`shear_tolerance`.
 
     Examples
     --------
@@ -88,6 +91,14 @@ class InterfaceSettings:
     follow: bool | None = None
     link: Literal["corrected", "half_space"] = "corrected"
     tolerance: float = 1e-8
+
+    @property
+    def shear_tolerance(self) -> float:
+        """Relative tolerance of contact with friction: a hundredth of ``tolerance``, down to 1e-8.
+
+        The energy of small slips is a small difference of large forces.
+        """
+        return min(self.tolerance, max(TIGHTEST, SHEAR_SHARE * self.tolerance))
 
     def __post_init__(self) -> None:
         checks.settle(self, gap=checked_heights(self.gap, self.grid))

@@ -18,7 +18,8 @@ from fe_models.elasticity.relinearised import (
 )
 from fe_models.elasticity.stress import CycleStress, cycle_stresses
 from fe_models.joints.friction import FrictionalJoint, FrictionState
-from fe_models.joints.joint import JointResolvent
+from fe_models.joints.joint import JointResolvent, Resolvent
+from fe_models.joints.sparse_joint import SparseResolvent
 from fe_models.loads.pretension import Bolt, tightened
 from fe_models.meshes.cut_face import whole_history, whole_resultants
 from fe_models.meshes.remesh import worn_mesh
@@ -91,12 +92,12 @@ class StructureLoads(ReportsProgress):
 
     @cached_property
     def joint(self) -> FrictionalJoint:
-        """The condensed joint before any wear, from the cache if it is there."""
+        """The joint before any wear, from the cache if it is there."""
         return FrictionalJoint(self._resolvent, self._nodal_friction())
 
     @cached_property
-    def _resolvent(self) -> JointResolvent:
-        """The condensed joint with the stiffness that the case asks for."""
+    def _resolvent(self) -> Resolvent:
+        """The joint with the stiffness that the case asks for."""
         resolvent = self._linear_resolvent
         # Only a nonlinear stiffness needs the structure itself, which takes seconds to build.
         if self.model.nonlinearity.stiffness != "linear":
@@ -109,11 +110,18 @@ class StructureLoads(ReportsProgress):
         """Number of rigid motions that contact alone prevents."""
         return self._linear_resolvent.rigid_modes
 
+    @property
+    def sparse(self) -> bool:
+        """Whether the joint has sparse factors, since full matrices do not fit into memory."""
+        return isinstance(self._linear_resolvent, SparseResolvent)
+
     @cached_property
-    def _linear_resolvent(self) -> JointResolvent:
-        def condense() -> JointResolvent:
-            keep = self._store.body
-            return self._linear.condense(progress=self._progress, keep=keep).resolvent()
+    def _linear_resolvent(self) -> Resolvent:
+        def condense() -> Resolvent:
+            if self.model.nonlinearity.stiffness == "linear":
+                return self._linear.resolvent(self._progress, self._store.body)
+            # The joint along the path of a nonlinear stiffness has full matrices.
+            return self._linear.condense(None, self._progress, self._store.body).resolvent()
 
         joint, self.from_cache = self._store.joint(self.model.key, condense)
         return joint
@@ -305,6 +313,7 @@ class StructureLoads(ReportsProgress):
     def stiffest(self, areas: Array) -> float:
         """Return the largest rise of nodal pressure per change of gap, for ``areas`` [MPa/mm]."""
         scale = np.divide(1.0, np.sqrt(areas), out=np.zeros_like(areas), where=areas > 0.0)
+        assert isinstance(self._resolvent, JointResolvent), "plane faces are small"
         stiffness = self._resolvent.normal_stiffness(len(areas))
         last = len(areas) - 1
         (largest,) = eigvalsh(scale[:, None] * stiffness * scale, subset_by_index=[last, last])

@@ -12,7 +12,7 @@ from fe_models.elasticity.local_model import LocalModel
 from fe_models.elasticity.relinearised import Softening
 from fe_models.joints.condensation import Condensed
 from fe_models.joints.face_traction import FaceTraction
-from fe_models.joints.joint import JointResolvent
+from fe_models.joints.joint import Resolvent
 from fe_models.loads.pretension import Bolt
 from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.structure import CycleSolution, Structure
@@ -186,8 +186,8 @@ class StructureStore(Protocol):
         ...
 
     def joint(
-        self, key: tuple[object, ...], make: Callable[[], JointResolvent]
-    ) -> tuple[JointResolvent, bool]:
+        self, key: tuple[object, ...], make: Callable[[], Resolvent]
+    ) -> tuple[Resolvent, bool]:
         """Return the condensed joint of a key, and whether it was stored."""
         ...
 
@@ -215,8 +215,8 @@ class NoStore:
         return make()
 
     def joint(
-        self, key: tuple[object, ...], make: Callable[[], JointResolvent]
-    ) -> tuple[JointResolvent, bool]:
+        self, key: tuple[object, ...], make: Callable[[], Resolvent]
+    ) -> tuple[Resolvent, bool]:
         return make(), False
 
     def cycle(

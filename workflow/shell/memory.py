@@ -33,6 +33,11 @@ class Memory:
         """Total memory [bytes]."""
         return BYTES * self.numbers + self.bytes + REST
 
+    @property
+    def fits(self) -> bool:
+        """Whether the machine has as much free memory."""
+        return self.required <= _available_bytes()
+
     def check(self) -> None:
         """Raise :class:`OutOfMemory` if the machine has less free memory."""
         required, available = self.required, _available_bytes()

@@ -14,6 +14,7 @@ from fe_models.loads.rigid_motions import rigid_body_modes
 from fe_models.solvers import linear_solver, memory, pardiso, superlu
 from fe_models.solvers.linear_solver import (
     FactorMemoryError,
+    RefinedFactors,
     SolverError,
     condense,
     factorise,
@@ -97,6 +98,29 @@ def test_solutions(matrix, rng, solver, columns):
     np.testing.assert_allclose(solution, np.linalg.solve(matrix.toarray(), rhs), rtol=1e-9)
 
 
+@pytest.mark.parametrize("columns", [(), (3,)])
+def test_solutions_in_single_precision_are_refined(matrix, rng, solver, columns):
+    """Check loads of any size, also beyond the range of single precision."""
+    exact = 1e50 * rng.standard_normal((SIZE, *columns))
+    factors = RefinedFactors(matrix)
+    np.testing.assert_allclose(factors(matrix @ exact), exact, rtol=1e-8)
+    rounded = factors.rounded(matrix @ exact * 1e-50)
+    error = np.abs(rounded - exact * 1e-50).max()
+    assert error < 1e-4
+    assert error > 1e-9 or solver != "pardiso"
+    assert not factors(np.zeros((SIZE, *columns))).any()
+
+
+def test_double_precision_where_refinement_fails(rng, solver):
+    """Check a matrix whose condition number is beyond single precision."""
+    basis, _ = np.linalg.qr(rng.standard_normal((SIZE, SIZE)))
+    matrix = sp.csr_matrix((basis * np.logspace(0, -9, SIZE)) @ basis.T)
+    matrix = sp.csr_matrix(0.5 * (matrix + matrix.T))
+    load = matrix @ rng.standard_normal(SIZE)
+    solution = RefinedFactors(matrix)(load)
+    assert np.linalg.norm(matrix @ solution - load) < 1e-11 * np.linalg.norm(load)
+
+
 def test_schur_complement_follows_the_order_of_the_kept_unknowns(matrix, split, solver):
     assert np.any(np.diff(split[0]) < 0)
     expected = dense_schur(matrix, *split)
@@ -166,8 +190,9 @@ def test_wrong_schur_complement_of_pardiso_is_caught(matrix, split, monkeypatch,
 def test_body_that_is_not_held(box, titanium, solver):
     """Check that six rigid motions give an error instead of a solution."""
     stiffness = box((2, 2, 2), (0, 0, 0), (1, 1, 1), titanium, 1).stiffness
-    with pytest.raises(SolverError, match="a body is not held"):
-        factorise(stiffness)
+    for factors in (factorise, RefinedFactors):
+        with pytest.raises(SolverError, match="a body is not held"):
+            factors(stiffness)
 
 
 @pytest.mark.parametrize("rows", [[[1.0, 1.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 0.0]]])
@@ -185,6 +210,8 @@ def test_too_little_memory_is_an_error_before_factorising(box, titanium, solver,
     monkeypatch.setattr(Pardiso, "factorise", never)
     monkeypatch.setattr(Pardiso, "schur", never)
     monkeypatch.setattr(superlu, "factors", never)
+    with pytest.raises(FactorMemoryError, match="coarser mesh"):
+        RefinedFactors(matrix, memory=1e4)
     with pytest.raises(FactorMemoryError, match="coarser mesh") as caught:
         factorise(matrix, memory=1e4)
     assert caught.value.available == 1e4

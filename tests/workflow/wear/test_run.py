@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from fe_models import structure
 from fe_models.geometry.imported import read_bodies
 from tests.marks import slow
 from tests.workflow.command_line import invoke
@@ -204,6 +205,24 @@ def test_two_runs_are_bitwise_equal(start, whole, tmp_path):
         np.testing.assert_array_equal(height, second[name], err_msg=name)
     assert again.summary["structure"]["from_cache"]
     assert again.summary["kinetics"] == whole.summary["kinetics"]
+
+
+@pytest.mark.slow
+def test_structure_without_full_matrices_wears_alike(start, tmp_path, monkeypatch):
+    """The sparse run comes first, since full matrices are used wherever the cache has them."""
+    settings = ("mesh.flank_nodes=[7, 9]", "coupling.resultants=every", *QUICK)
+    with monkeypatch.context() as scarce:
+        scarce.setattr(structure, "available_bytes", lambda: 0.0)
+        sparse = start(tmp_path / "sparse", *settings)
+    full = start(tmp_path / "full", *settings)
+    kinds = [run.summary["structure"]["joint"] for run in (sparse, full)]
+    assert kinds == ["sparse factors", "full matrices"]
+    assert "sparse factors" in (sparse.folder / "run.log").read_text(encoding="utf-8")
+    for name, height in full.heights().items():
+        deepest = full.summary["intrados"]["depth_1"]
+        np.testing.assert_allclose(
+            sparse.heights()[name], height, atol=1e-4 * deepest, err_msg=name
+        )
 
 
 @pytest.mark.slow

@@ -23,6 +23,7 @@ from workflow.models.checks.warnings import growth_warnings, instability_warning
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
 from workflow.models.progress import ReportsProgress
+from workflow.models.structure import StructureLoads
 from workflow.shell.analysis import Run
 from workflow.shell.folders.steps import RunSteps
 from workflow.shell.terminal.reporter import Reporter
@@ -42,6 +43,17 @@ def reported_stage(reporter: Reporter, working: object, name: str, of: str) -> I
         if isinstance(working, ReportsProgress):
             stack.enter_context(working.reporting_to(reported))
         yield
+
+
+def prepare_loads(source: LoadSource, reporter: Reporter) -> None:
+    """Prepare the loads in a stage of their own; a structure is condensed or factorised."""
+    with reported_stage(reporter, source, "condensation", "steps"):
+        source.prepare()
+    if isinstance(source, StructureLoads) and source.sparse:
+        reporter.say(
+            "joint: sparse factors, since full matrices do not fit into memory: the same results, "
+            "but cycles with friction take longer"
+        )
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from workflow.analyses.wear.contact_workers import WorkerCalls, contact_workers
 from workflow.analyses.wear.model import wear_model
 from workflow.analyses.wear.output.outcome import Outcome
 from workflow.analyses.wear.output.results import write_output
-from workflow.analyses.wear.recording import FileRecorder, RunLog, reported_stage
+from workflow.analyses.wear.recording import FileRecorder, RunLog, prepare_loads, reported_stage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.writing import marched
@@ -90,8 +90,7 @@ def _compute(
         check_section(case, face)
     in_workers = _wears_in_workers(case, source)
     workers = working.enter_context(contact_workers(case, faces if in_workers else ()))
-    with reported_stage(reporter, source, "condensation", "steps"):
-        source.prepare()
+    prepare_loads(source, reporter)
     probe_results = begin_probe_runs(case, model, source, run.worker)
     with one_thread():
         with reported_stage(reporter, source, "structural friction", "increments"):

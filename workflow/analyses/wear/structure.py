@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from fe_models.solvers.memory import full_matrices_bytes
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.run_time import Extent
 from workflow.messages.warning_kinds import Notice
@@ -21,8 +22,6 @@ AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 
 # Numbers per cell that are held during a contact solve, for spectra and iterates.
 SPECTRA = 300
-# Number of dense interface matrices that are held while a joint is condensed.
-DENSE_MATRICES = 6
 
 
 def memory(
@@ -31,17 +30,35 @@ def memory(
     interface_nodes: int = 0,
     kept: int = SPECTRA,
     remedy: str = "lower contact.grid",
-    matrices: int = DENSE_MATRICES,
+    bodies: int = 2,
+    mirrored: bool = False,
+    sparse: bool = False,
 ) -> Memory:
-    """Return the memory of the contacts and of a structure condensed onto its interfaces.
+    """Return the memory of the contacts and of a structure with its joint.
 
-    ``nodes`` and ``interface_nodes`` are 0 while they are unknown. ``kept`` is the count of numbers
-    per cell of the grid, by default that of one contact at a time; ``matrices`` is the number of
-    dense interface matrices held at once.
+    Parameters
+    ----------
+    case
+        The case.
+    nodes, interface_nodes
+        Numbers of nodes of all bodies and of all interfaces, 0 while they are unknown.
+    kept
+        Count of numbers per cell of the grid, by default that of one contact at a time.
+    remedy
+        How the case can be made smaller.
+    bodies
+        Number of bodies.
+    mirrored
+        Whether the bodies have a plane of symmetry, which halves the matrices.
+    sparse
+        Whether the joint can do without full matrices where they do not fit, as that of a linear
+        structure of first-order elements (:mod:`fe_models.joints.sparse_joint`).
     """
-    dense = matrices * (3 * interface_nodes) ** 2
     cells = max(prod(terms.grid) for terms in case.every_terms)
-    return Memory(dense + cells * kept, remedy, factor_bytes(nodes))
+    factors = factor_bytes(nodes)
+    matrices = full_matrices_bytes(3 * interface_nodes, bodies, mirrored)
+    full = Memory(cells * kept, remedy, factors + matrices)
+    return full if full.fits or not sparse else Memory(cells * kept, remedy, factors)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from platformdirs import user_cache_path
 import fe_models
 import sa_solver
 from fe_models.joints.condensation import Condensed
-from fe_models.joints.joint import JointResolvent
+from fe_models.joints.joint import JointResolvent, Resolvent
 from fe_models.solvers.symmetry import Mirror, SplitMatrix
 from fe_models.structure import FIELDS, CycleSolution, Structure
 from sa_solver.types import Array
@@ -76,14 +76,15 @@ class DiskStore:
         return stiffness, loads
 
     def joint(
-        self, key: tuple[object, ...], make: Callable[[], JointResolvent]
-    ) -> tuple[JointResolvent, bool]:
-        """Return the condensed joint of a key, and whether it was stored."""
+        self, key: tuple[object, ...], make: Callable[[], Resolvent]
+    ) -> tuple[Resolvent, bool]:
+        """Return the joint of a key, and whether it was stored; only full matrices are."""
         name = f"joint-{content_key(*key)}"
         if (stored := _load(name)) is not None:
             return _restored_joint(*stored), True
         joint = make()
-        _save_joint(name, joint)
+        if isinstance(joint, JointResolvent):
+            _save_joint(name, joint)
         return joint, False
 
     def cycle(

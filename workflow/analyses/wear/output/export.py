@@ -13,7 +13,7 @@ from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.checks.warnings import warn_of_structure
 from workflow.analyses.wear.choice import report_choice
 from workflow.analyses.wear.model import loads_of
-from workflow.analyses.wear.recording import reported_stage
+from workflow.analyses.wear.recording import prepare_loads, reported_stage
 from workflow.analyses.wear.run import meshed_faces
 from workflow.analyses.wear.structures import resultants, structure_of
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
@@ -81,8 +81,7 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
 
 def _write(case: WearCase, source: StructureLoads, out: Path, reporter: Reporter) -> None:
     faces = meshed_faces(case, source, reporter)
-    with reported_stage(reporter, source, "condensation", "steps"):
-        source.prepare()
+    prepare_loads(source, reporter)
     with reported_stage(reporter, source, "structural friction", "increments"):
         histories = {
             history.interface.name: _numbered(source, history) for history in source.unworn()

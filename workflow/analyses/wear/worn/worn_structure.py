@@ -105,6 +105,7 @@ class WornStructure:
         bodies = self.stressed.mesh.bodies
         return {
             "from_cache": stage.from_cache,
+            "joint": "sparse factors" if stage.sparse else "full matrices",
             "nodes": {body.name: int(body.mesh.nvertices) for body in bodies},
             "mesh": {body.name: _mesh_summary(body) for body in stage.mesh.bodies},
             "rigid_modes": stage.rigid_modes,

@@ -32,13 +32,20 @@ def _model(case: DovetailCase) -> StructureModel:
 
 
 def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
-    """Return the memory of a run; in space, flank nodes are known and all increments are stored."""
+    """Return the memory of a run.
+
+    In space, flank nodes are known, those of both bodies are estimated before they are meshed, and
+    all increments are stored.
+    """
     kept = SPECTRA
     if case.structure.dimension == 3:
         interface_nodes = 2 * prod(case.mesh.flank_nodes)
+        nodes = nodes or int(_extent(case).nodes)
         kept = 2 * len(case.load_path.shares) * sum(case.expected_legs) * FIELDS
     remedy = "lower mesh.flank_nodes, mesh.notch, mesh.order or contact.grid, or raise mesh.size"
-    return memory(case, nodes, interface_nodes, kept, remedy)
+    mirrored = case.structure.dimension == 3 and case.structure.skew == 0.0
+    sparse = case.mesh.order == 1 and not case.nonlinearity.asked
+    return memory(case, nodes, interface_nodes, kept, remedy, mirrored=mirrored, sparse=sparse)
 
 
 def _extent(case: DovetailCase) -> Extent:

@@ -5,21 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import (
-    DENSE_MATRICES,
-    WearStructure,
-    memory,
-)
+from workflow.analyses.wear.structure import WearStructure, memory
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.errors import UserError
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
     from workflow.models.structure_model import StructureModel
-
-# Number of dense interface matrices held while more than two bodies are joined: 9.6 for a stack of
-# 12 blocks.
-OF_MANY = 10
 
 
 def _model(case: MeshCase) -> StructureModel:
@@ -42,8 +34,9 @@ def _extent(case: MeshCase) -> Extent:
 
 
 def _memory(case: MeshCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
-    matrices = OF_MANY if case.structure.other_bodies else DENSE_MATRICES
-    return memory(case, nodes, interface_nodes, matrices=matrices)
+    bodies = 2 + len(case.structure.other_bodies)
+    sparse = case.mesh.order == 1 and not case.nonlinearity.asked
+    return memory(case, nodes, interface_nodes, bodies=bodies, sparse=sparse)
 
 
 def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
