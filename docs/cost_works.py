@@ -64,8 +64,6 @@ AGAIN = ("normal", "friction", "unlike")
 CONTACT_SHARE, SHEAR_SHARE = 0.6, 0.75
 # Number of nodes across and along a flank of the default dovetail.
 FLANK = np.array([20, 34])
-# Element size of bodies in which 55 nodes across a flank come with 10^6 unknowns [mm], times nodes.
-FINE = 87.0
 # Number of nodes along a side of the blocks of a stack, and its cycle of four increments.
 SIDE, PATH = 16, np.array([[1.0, 0.5], [1.0, 1.0], [1.0, 0.0], [1.0, -1.0]])
 # The shipped rig: nodes along a side of its pads less one, odd harmonics, force [N], span [Hz].
@@ -143,20 +141,6 @@ def missions(nodes: int) -> Sized:
     return Sized(stage.interface_count(), run)
 
 
-def sparse(nodes: int) -> Sized:
-    """Solve a mission on sparse factors of a skewed dovetail in fine bodies; count iterations."""
-    stage = _dovetail(nodes, FINE / nodes, "structure.skew=10 deg")
-    structure, (path, *_) = stage.structure, stage.model.load_cycles
-
-    def run() -> int:
-        joint = FrictionalJoint(structure.resolvent(memory=0.0), stage.friction[0])
-        cycle = structure.solve_cycle(joint, path.amplitudes, structure.gap(), stage.friction[0])
-        assert cycle.converged
-        return cycle.iterations
-
-    return Sized(stage.interface_count(), run)
-
-
 def stack(bodies: int) -> Sized:
     """Press and shear ``bodies`` stacked blocks with friction; count unknowns."""
     structure = _stack(bodies)
@@ -191,10 +175,10 @@ def _stack(bodies: int) -> Structure:
     return imported_structure(mesh, imported, [TITANIUM] * bodies, held, loads, 1)
 
 
-def _dovetail(nodes: int, size: float = 5.0, *settings: str) -> StructureLoads:
+def _dovetail(nodes: int) -> StructureLoads:
     along = round(nodes * FLANK[1] / FLANK[0])
-    mesh = f"mesh={{flank_nodes: [{nodes}, {along}], size: {size} mm, notch: 48, order: 1}}"
-    case: Any = load_case(CASES / "dovetail.yaml", [mesh, *settings])
+    mesh = f"mesh={{flank_nodes: [{nodes}, {along}], size: 5 mm, notch: 48, order: 1}}"
+    case: Any = load_case(CASES / "dovetail.yaml", [mesh])
     return structure_loads(case, dovetail_joint)
 
 
@@ -239,7 +223,6 @@ WORKS: dict[str, tuple[Callable[[int], Sized], int]] = {
     "unlike": (partial(friction, pair=UNLIKE), 32),
     "condensation": (condensation, 8),
     "missions": (missions, 8),
-    "sparse": (sparse, 8),
     "stack": (stack, 2),
     "harmonics": (harmonics, 1),
     "contacts": (contacts, 4),
