@@ -33,8 +33,9 @@ COLUMNS_AT_ONCE = 256
 FEWEST_INNER = 8
 BYTES = 8
 # Residual over the load to which solutions of factors in single precision are refined, in 3 to 5
-# solutions, and the number of solutions after which this has failed.
-REFINED, MOST_REFINED = 1e-11, 12
+# solutions, and the number of solutions after which this has failed. Below the share ROUNDED of
+# |K| |u| a residual consists of rounding.
+REFINED, MOST_REFINED, ROUNDED = 1e-11, 12, 1e-14
 # Residual over the load at which iterations end, and the number of iterations that is an error.
 ITERATED = 1e-10
 MOST_ITERATIONS = 500
@@ -100,7 +101,7 @@ class RefinedFactors:
     """
 
     def __init__(self, matrix: sp.csr_matrix, memory: float | None = None) -> None:
-        self._matrix = matrix
+        self._matrix, self._largest = matrix, np.abs(matrix).max()
         # The type is Any because None releases the memory of factors before the next ones.
         self._solve: Any = _pardiso(matrix, _limit(memory), single=True)
         self._single = self._solve is not None
@@ -132,7 +133,8 @@ class RefinedFactors:
             size = np.where(size > 0.0, size, 1.0)
             solution = solution + size * self._solve(left / size)
             left = rhs - self._matrix @ solution
-            if np.all(np.linalg.norm(left, axis=0) <= REFINED * load):
+            rounding = ROUNDED * self._largest * np.linalg.norm(solution, axis=0)
+            if np.all(np.linalg.norm(left, axis=0) <= np.maximum(REFINED * load, rounding)):
                 return solution
         return None
 
