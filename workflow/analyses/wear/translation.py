@@ -40,7 +40,7 @@ def contact_of(case: WearCase, name: str) -> Contact:
         method=settings.method,
         link=settings.link,
         gross_slip=settings.gross_slip,
-        tolerance=case.contact_tolerance,
+        tolerance=settings.tolerance,
     )
 
 

@@ -23,7 +23,7 @@ APPROXIMATIONS = (
     ),
     Approximation(
         *("tolerance", "tolerance of the contact solver", ladders.tolerances),
-        entries=("contact.tolerance", "contact.grid"),
+        entries=("contact.tolerance",),
         order=1.0,
         decide=decisions.choose_tolerance,
         remedy=Remedy("solver", "contact.tolerance"),
