@@ -235,12 +235,16 @@ class Structure:
         else:
             jobs = (partial(body.condense, done, keep) for body in self.bodies)
             condensed = self.run_parallel(*jobs)
-            among_free = np.cumsum(~np.concatenate(self.held)) - 1
-            pairs = zip(self.bodies, self.places, strict=True)
-            places = [among_free[place[~body.held]] for body, place in pairs]
-            joint = join(condensed, self._free_projection, places, self.held[1], like)
+            joint = join(condensed, self._free_projection, self._free_places, self.held[1], like)
         done()
         return joint
+
+    @property
+    def _free_places(self) -> list[Indices]:
+        """Positions of each body's free interface displacements among those of all faces."""
+        among_free = np.cumsum(~np.concatenate(self.held)) - 1
+        pairs = zip(self.bodies, self.places, strict=True)
+        return [among_free[place[~body.held]] for body, place in pairs]
 
     @property
     def _free_projection(self) -> sp.csr_matrix | None:
@@ -261,8 +265,8 @@ class Structure:
 
     def _sparse_resolvent(self, bodies: Sequence[SparseBody]) -> SparseResolvent:
         """Return the resolvent of all bodies as one sparse system."""
-        free = [place[~body.held] for body, place in zip(self.bodies, self.places, strict=True)]
-        relative = relative_displacements(self._free_projection, self.held, np.concatenate(free))
+        order = np.concatenate(self._free_places)
+        relative = relative_displacements(self._free_projection, self.held, order)
         rho = expected_rho(bodies, self.mesh.interfaces)
         rigid_modes = sum(body.rigid_modes for body in self.bodies)
         return SparseResolvent(bodies, relative, rho, rigid_modes, self._mirror())

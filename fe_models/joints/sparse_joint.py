@@ -63,14 +63,14 @@ def relative_displacements(
     held
         Flags of the displacements of faces 1 and of faces 2 that supports hold; w is zero there.
     order
-        Position ``(k,)`` of each of the bodies' displacements among those of faces 1, then 2.
+        Position ``(k,)`` of each of the bodies' displacements among the free ones of faces 1, then
+        of faces 2.
     """
     held_1, held_2 = held
     moved = sp.identity(np.sum(~held_1)) if projection is None else projection
     apart = sp.hstack([-moved, sp.identity(np.sum(~held_2))], format="csc")
-    among_free = np.cumsum(~np.concatenate(held)) - 1
     onto_all = sp.identity(len(held_2), format="csc")[:, ~held_2]
-    return (onto_all @ apart[:, among_free[order]]).tocsr()
+    return (onto_all @ apart[:, order]).tocsr()
 
 
 def expected_rho(bodies: Sequence[SparseBody], faces: Sequence[Face]) -> float:

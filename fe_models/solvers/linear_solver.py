@@ -101,27 +101,31 @@ class RefinedFactors:
     """
 
     def __init__(self, matrix: sp.csr_matrix, memory: float | None = None) -> None:
-        self._matrix, self._largest = matrix, np.abs(matrix).max()
+        self._matrix, self._memory = matrix, memory
+        self._largest = np.abs(matrix).max()
         # The type is Any because None releases the memory of factors before the next ones.
         self._solve: Any = _pardiso(matrix, _limit(memory), single=True)
         self._single = self._solve is not None
         load = _random_load(matrix)
         solution = self._refined(load) if self._single else None
         if solution is None or _has_grown(matrix, load, solution):
-            self._solve, self._single = None, False
-            self._solve = factorise(matrix, memory)
+            self._factorise_in_double()
 
     def rounded(self, rhs: Array) -> Array:
         """Return solutions as exact as the factors."""
         return np.asarray(self._solve(rhs))
 
     def __call__(self, rhs: Array) -> Array:
-        if not self._single:
-            return np.asarray(self._solve(rhs))
-        solution = self._refined(rhs)
-        if solution is None:
-            raise SolverError(SINGULAR)
-        return solution
+        if self._single:
+            solution = self._refined(rhs)
+            if solution is not None:
+                return solution
+            self._factorise_in_double()
+        return np.asarray(self._solve(rhs))
+
+    def _factorise_in_double(self) -> None:
+        self._solve, self._single = None, False
+        self._solve = factorise(self._matrix, self._memory)
 
     def _refined(self, rhs: Array) -> Array | None:
         """Return refined solutions, or None if refinement does not converge."""

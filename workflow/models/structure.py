@@ -112,7 +112,7 @@ class StructureLoads(ReportsProgress):
 
     @property
     def sparse(self) -> bool:
-        """Whether the joint has sparse factors, since full matrices do not fit into memory."""
+        """True if the joint has sparse factors, since full matrices do not fit into memory."""
         return isinstance(self._linear_resolvent, SparseResolvent)
 
     @cached_property
@@ -313,7 +313,7 @@ class StructureLoads(ReportsProgress):
     def stiffest(self, areas: Array) -> float:
         """Return the largest rise of nodal pressure per change of gap, for ``areas`` [MPa/mm]."""
         scale = np.divide(1.0, np.sqrt(areas), out=np.zeros_like(areas), where=areas > 0.0)
-        assert isinstance(self._resolvent, JointResolvent), "plane faces are small"
+        assert isinstance(self._resolvent, JointResolvent), "the run needs its full matrices"
         stiffness = self._resolvent.normal_stiffness(len(areas))
         last = len(areas) - 1
         (largest,) = eigvalsh(scale[:, None] * stiffness * scale, subset_by_index=[last, last])

@@ -35,7 +35,7 @@ class Memory:
 
     @property
     def fits(self) -> bool:
-        """Whether the machine has as much free memory."""
+        """True if the machine has as much free memory."""
         return self.required <= _available_bytes()
 
     def check(self) -> None:

@@ -121,6 +121,13 @@ def test_double_precision_where_refinement_fails(rng, solver):
     assert np.linalg.norm(matrix @ solution - load) < 1e-11 * np.linalg.norm(load)
 
 
+def test_solution_that_cannot_be_refined_is_computed_in_double_precision(matrix, rng, monkeypatch):
+    need_pardiso()
+    factors, load = RefinedFactors(matrix), rng.standard_normal(SIZE)
+    monkeypatch.setattr(factors, "_refined", lambda _: None)
+    np.testing.assert_allclose(matrix @ factors(load), load, atol=1e-10)
+
+
 def test_schur_complement_follows_the_order_of_the_kept_unknowns(matrix, split, solver):
     assert np.any(np.diff(split[0]) < 0)
     expected = dense_schur(matrix, *split)
@@ -234,6 +241,19 @@ def test_a_container_leaves_less_than_its_machine(monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("count", "given"), [(8, 4), (2, 2), (1, None)])
+def test_threads_beside_others_have_two_of_mkl_or_none_are_beside(monkeypatch, count, given):
+    """A single thread of MKL beside others has crashed PARDISO, so jobs then take turns."""
+    asked = []
+    mkl = SimpleNamespace(
+        MKL_Get_Max_Threads=lambda: count,
+        MKL_Set_Num_Threads_Local=lambda share: asked.append(share) or 0,
+    )
+    monkeypatch.setattr(pardiso, "library", lambda: mkl)
+    assert pardiso.in_parallel([lambda: "one", lambda: "two"]) == ["one", "two"]
+    assert sorted(asked) == ([] if given is None else [0, 0, given, given])
+
+
 def test_factors_on_two_threads_are_the_same_bit_for_bit(box, titanium):
     need_pardiso()
     mkl = pardiso.library()

@@ -15,6 +15,7 @@ from workflow import errors
 from workflow.cli import cli
 from workflow.commands.group import OneLineGroup
 from workflow.kinds import kinds
+from workflow.shell import memory
 
 CASES = Path(__file__).parents[3] / "cases"
 # Only these outside the standard library may be imported to print the help.
@@ -74,11 +75,30 @@ def test_check_prints_the_grid_and_the_increments(dovetail_path):
 
 
 def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
-    """Both flanks condensed onto 90,000 degrees of freedom need 400 GB of dense matrices."""
+    """Both flanks condensed onto 90,000 degrees of freedom need 200 GB of full matrices."""
     result = invoke("check", dovetail_path, "--set", "mesh.flank_nodes=[101, 151]")
     assert result.exit_code == 4
     assert "mesh.flank_nodes" in result.stderr
     assert "OK" not in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("setting", "exit_code"),
+    [
+        ("contact.method=normal", 0),
+        ("contact.method=nodes", 4),
+        ("nonlinearity.stiffness=relinearised", 4),
+    ],
+)
+def test_check_knows_which_joints_do_without_full_matrices(
+    dovetail_path, monkeypatch, setting, exit_code
+):
+    """Full matrices of both flanks need 7 GB, and factors of the bodies 4 GB."""
+    monkeypatch.setattr(memory, "_available_bytes", lambda: 8e9)
+    fine = "mesh={flank_nodes: [41, 69], size: 12 mm, notch: 16, order: 1}"
+    settings = fine, setting, "wear.step={kind: second_order}"
+    result = invoke("check", dovetail_path, *(f"--set={entry}" for entry in settings))
+    assert result.exit_code == exit_code, result.stderr
 
 
 @pytest.mark.parametrize("kind", kinds())

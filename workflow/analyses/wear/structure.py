@@ -8,7 +8,7 @@ from math import prod
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from fe_models.solvers.memory import full_matrices_bytes
-from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.run_time import Extent
 from workflow.messages.warning_kinds import Notice
 from workflow.shell.analysis import as_written
@@ -51,14 +51,22 @@ def memory(
     mirrored
         Whether the bodies have a plane of symmetry, which halves the matrices.
     sparse
-        Whether the joint can do without full matrices where they do not fit, as that of a linear
-        structure of first-order elements (:mod:`fe_models.joints.sparse_joint`).
+        Whether the joint can do without full matrices where they do not fit.
     """
     cells = max(prod(terms.grid) for terms in case.every_terms)
     factors = factor_bytes(nodes)
     matrices = full_matrices_bytes(3 * interface_nodes, bodies, mirrored)
     full = Memory(cells * kept, remedy, factors + matrices)
     return full if full.fits or not sparse else Memory(cells * kept, remedy, factors)
+
+
+def needs_no_matrices(case: FiniteElementCase, order: int) -> bool:
+    """Return whether the joint of bodies of this order of elements can do without full matrices.
+
+    Only a linear structure of first-order elements can (:mod:`fe_models.joints.sparse_joint`), and
+    nodes that wear need the matrix.
+    """
+    return order == 1 and not case.nonlinearity.asked and case.contact.method != "nodes"
 
 
 @dataclass(frozen=True)

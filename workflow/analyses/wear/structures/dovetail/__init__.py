@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.approximations.ladders import flank_mesh, slot_mesh
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory
+from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory, needs_no_matrices
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.messages.warning_kinds import Notice
 from workflow.shell.memory import Memory
@@ -44,7 +44,7 @@ def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Mem
         kept = 2 * len(case.load_path.shares) * sum(case.expected_legs) * FIELDS
     remedy = "lower mesh.flank_nodes, mesh.notch, mesh.order or contact.grid, or raise mesh.size"
     mirrored = case.structure.dimension == 3 and case.structure.skew == 0.0
-    sparse = case.mesh.order == 1 and not case.nonlinearity.asked
+    sparse = needs_no_matrices(case, case.mesh.order)
     return memory(case, nodes, interface_nodes, kept, remedy, mirrored=mirrored, sparse=sparse)
 
 

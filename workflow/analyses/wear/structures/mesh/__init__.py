@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import WearStructure, memory
+from workflow.analyses.wear.structure import WearStructure, memory, needs_no_matrices
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.errors import UserError
 from workflow.shell.memory import Memory
@@ -35,7 +35,7 @@ def _extent(case: MeshCase) -> Extent:
 
 def _memory(case: MeshCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
     bodies = 2 + len(case.structure.other_bodies)
-    sparse = case.mesh.order == 1 and not case.nonlinearity.asked
+    sparse = needs_no_matrices(case, case.mesh.order)
     return memory(case, nodes, interface_nodes, bodies=bodies, sparse=sparse)
 
 
