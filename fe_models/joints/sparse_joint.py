@@ -23,6 +23,7 @@ within 20 % of the geometric mean; twice or half of it takes 5 to 25 % more iter
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from fe_models.meshes.structure_mesh import Face
 from fe_models.solvers.linear_solver import RefinedFactors, SolverError
+from fe_models.solvers.pardiso import in_parallel
 from fe_models.solvers.symmetry import Mirror, halves
 from sa_solver.types import Array, Indices, Mask
 
@@ -173,8 +175,10 @@ class SparseResolvent:
         return self._sum(lambda part: part.factors.rounded(part.relative.T @ vectors))
 
     def _sum(self, displacement: Callable[[_Part], Array]) -> Array:
-        """Return the sum of the relative displacements of all parts."""
-        return np.asarray(sum(part.relative @ displacement(part) for part in self._parts))
+        """Return the sum of the relative displacements of all parts, solved in parallel."""
+        found = in_parallel([partial(displacement, part) for part in self._parts])
+        pairs = zip(self._parts, found, strict=True)
+        return np.asarray(sum(part.relative @ moved for part, moved in pairs))
 
     def _unsprung(self, displacement: Array) -> Array:
         """Return (H + ρ) times displacements ``(d n, cases)``, by conjugate gradients.

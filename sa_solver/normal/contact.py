@@ -256,7 +256,7 @@ class NormalContact:
         else:
             zero = np.zeros(self.grid.shape)
             iterate, method = Iterate(zero, zero.copy(), apart), "no load"
-            residuals = NormalResiduals(0.0, 0.0, 0.0, 0.0)
+            residuals = NormalResiduals(0.0, 0.0, 0.0, 0.0, 0.0)
         state = self._state(problem, control, iterate, residuals, tolerance)
         return replace(state, approach=state.approach + lowest, method=method)
 
@@ -382,6 +382,6 @@ def _failure(
         remedy = "loosen the tolerance, or smooth or refine the heights"
     return (
         f"the normal contact stopped at a residual of {measured.largest:.1e} (penetration "
-        f"{measured.penetration:.1e}, complementarity {measured.complementarity:.1e}) above the "
-        f"tolerance {tolerance:.0e}: {remedy}"
+        f"{measured.penetration:.1e}, complementarity {measured.complementarity:.1e}, wear "
+        f"{measured.wear:.1e}) above the tolerance {tolerance:.0e}: {remedy}"
     )

@@ -98,17 +98,21 @@ class NormalResiduals:
         Largest negative gap over the largest displacement (K + D) p.
     complementarity
         Largest |p g| over the largest pressure times the largest displacement.
+    wear
+        Largest of min(D p, |g|) over the largest displacement: what a step of wear would remove
+        where there is a gap. The complementarity alone lets small pressures do that.
     """
 
     force: float
     moment: float
     penetration: float
     complementarity: float
+    wear: float
 
     @property
     def largest(self) -> float:
-        """Largest of the four residuals."""
-        return max(self.force, self.moment, self.penetration, self.complementarity)
+        """Largest of all residuals."""
+        return max(self.force, self.moment, self.penetration, self.complementarity, self.wear)
 
 
 def contact_residuals(pressure: Array, displacement: Array, gap: Array) -> tuple[float, float]:
@@ -122,20 +126,21 @@ def contact_residuals(pressure: Array, displacement: Array, gap: Array) -> tuple
 
 
 def normal_residuals(problem: NormalProblem, iterate: Iterate) -> NormalResiduals:
-    """Return all four residuals of ``iterate``."""
+    """Return all residuals of ``iterate``."""
     total = iterate.pressure.sum()
     if not total > 0.0:
-        return NormalResiduals(np.inf, np.inf, np.inf, np.inf)
+        return NormalResiduals(np.inf, np.inf, np.inf, np.inf, np.inf)
     missing = np.abs(problem.modes.sums(iterate.pressure) - problem.target) / total
     first = 1 if APPROACH in problem.modes.free else 0
-    penetration, complementarity = contact_residuals(
-        iterate.pressure, iterate.displacement, iterate.gap(problem)
-    )
+    gap = iterate.gap(problem)
+    penetration, complementarity = contact_residuals(iterate.pressure, iterate.displacement, gap)
+    wear = np.minimum(problem.local_displacement(iterate.pressure), np.abs(gap))
     return NormalResiduals(
         float(missing[:first].max(initial=0.0)),
         float(missing[first:].max(initial=0.0)),
         penetration,
         complementarity,
+        float(wear.max() / iterate.displacement.max()),
     )
 
 

@@ -27,7 +27,13 @@ from wear.contact.moving import followed, passages
 from wear.contact.settings import InterfaceSettings
 from wear.contact.tractions import ContactFields, CycleTractions, acting_slip
 from wear.laws import EvolvingLaw
-from wear.steps.full_cycle import CycleStart, march_cycle, slip_known, starts_near
+from wear.steps.full_cycle import (
+    CycleStart,
+    march_cycle,
+    slip_around,
+    slip_known,
+    starts_near,
+)
 from wear.steps.marching import advance_cycles, rest
 from wear.steps.steppers import first_cycles
 from wear.steps.stepping import (
@@ -396,7 +402,8 @@ class InterfaceContact:
         if settings.method == "full":
             cycle = self._half_space_cycle(state, sliding, moved)
             slip = np.stack([increment.slip for increment in cycle])
-            sliding = replace(sliding, slip=acting_slip(slip, state.loads))
+            acting = acting_slip(slip_around(cycle, state.loads, self.grid), state.loads)
+            sliding = replace(sliding, slip=acting)
             if not self.pair.similar:
                 lift = self._contact.half_space.normal_under_shear
                 lifted = np.stack([lift(increment.shear) for increment in cycle])

@@ -14,10 +14,10 @@ import numpy as np
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
-from sa_solver.cycles.increments import before
+from sa_solver.cycles.increments import before, of_nearest
 from sa_solver.errors import ContactProblemError
 from sa_solver.normal.contact import NormalStart
-from sa_solver.types import Array, LoadHistory, Mask
+from sa_solver.types import Array, Grid, LoadHistory, Mask
 from wear.contact.drive import Drive
 from wear.steps.stepping import ContactFailure
 
@@ -82,6 +82,21 @@ def slip_known(cycle: Sequence[ContactState], loads: LoadHistory) -> Mask | None
         return None
     pressures = np.stack([state.pressure for state in cycle])
     return np.asarray((pressures > 0.0) | (before(pressures, loads.missions) > 0.0))
+
+
+def slip_around(cycle: Sequence[ContactState], loads: LoadHistory, grid: Grid) -> Array:
+    """Return the slip of each increment ``(t, 2, nx, ny)`` [mm], also around the contact.
+
+    Cells that are apart slip as the nearest cell in contact. They do not wear, because nothing
+    presses there, but a contact that grows onto them within a wear step wears them.
+    """
+    slip, known = np.stack([state.slip for state in cycle]), slip_known(cycle, loads)
+    assert known is not None
+    for increment, pressed in zip(slip, known, strict=True):
+        if pressed.any():
+            around = [of_nearest(component, pressed, grid.pitch) for component in increment]
+            increment[:] = np.where(pressed, increment, around)
+    return slip
 
 
 def march_cycle(

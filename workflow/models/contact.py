@@ -97,7 +97,7 @@ class Contact:
     method: Literal["normal", "full", "nodes"] = "normal"
     link: Literal["corrected", "half_space"] = "corrected"
     gross_slip: Literal["force", "energies"] = "force"
-    tolerance: float = 1e-8
+    tolerance: float = 5e-5
 
     def __post_init__(self) -> None:
         checks.choices(

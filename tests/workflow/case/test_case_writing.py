@@ -43,7 +43,6 @@ def test_dump_has_every_default(dovetail_path, dovetail_text):
         "method": "normal",
         "link": "corrected",
         "gross_slip": "force",
-        "tolerance": 1e-8,
     }
     assert parse_case(short, "short") == load_case(dovetail_path)
 

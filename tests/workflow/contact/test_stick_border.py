@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 
+import h5py
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -18,6 +19,7 @@ from scipy.optimize import brentq
 from tests.marks import slow
 from tests.workflow.command_line import invoke
 from wear.steps.stick_border import EDGE
+from workflow.models.budget.parts import ERROR_PER_TOLERANCE
 
 MODULUS, RADIUS, FRICTION = 1e5, 10.0, 0.3  # E* [MPa], R [mm]; G* = E*
 CASE = """title: wear in partial slip to its limiting shape
@@ -31,7 +33,7 @@ load_path:
   legs:
     - {{{pressing}, {along}: {value}, increments: 2}}
     - {{{pressing}, {along}: -{value}, increments: 2}}
-contact: {{grid: {grid}, size: {size}, method: full}}
+contact: {{grid: {grid}, size: {size}, method: full{solver}}}
 wear:
   law: archard
   cycles: {life}
@@ -45,11 +47,18 @@ output: {{paraview: false, figures: false, report: false}}
 FIXED = ", cycles: 1.5e7"
 
 
-def errors(folder, legs: tuple[str, str, str], cells: int, step: str = FIXED, life: str = "3e7"):
+def errors(
+    folder, legs: tuple[str, str, str], cells: int, step: str = FIXED, life: str = "3e7", solver=""
+):
     """Return the interface of a run under ``legs`` that press, and shear in both directions."""
     pressing, along, value = legs
     line = "/mm" in pressing
-    shape = {"shape": "cylinder" if line else "sphere", "step": step, "life": life}
+    shape = {
+        "shape": "cylinder" if line else "sphere",
+        "step": step,
+        "life": life,
+        "solver": solver,
+    }
     shape |= {"grid": cells if line else [cells] * 2, "size": "0.84 mm" if line else [0.84, 0.84]}
     path = folder / "case.yaml"
     text = CASE.format(**shape, pressing=pressing, along=along, value=value)
@@ -118,6 +127,35 @@ def test_the_grid_error_of_a_cylinder_in_partial_slip_is_estimated(tmp_path, str
     """Wear is 14 % too small on 40 cells, 17 % too large on 48, in two fixed steps."""
     found = errors(tmp_path, ("P: 700 N/mm", "Qx", "134.4 N/mm"), strips)
     assert_told(found, limit_of_cylinder(700.0, 134.4), most=1.6)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+def test_depth_and_volume_follow_the_tolerance_of_the_contact_solver(tmp_path, tolerance) -> None:
+    """Nothing presses on worn cells in the end: small errors of their pressure must not wear."""
+    legs, runs = ("P: 700 N/mm", "Qx", "134.4 N/mm"), []
+    for number, solved in enumerate((tolerance, 1e-10)):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        runs.append(errors(folder, legs, 40, solver=f", tolerance: {solved}"))
+    for name in ("depth_1", "volume_1"):
+        found, exact = (run[name] for run in runs)
+        assert abs(found / exact - 1.0) < ERROR_PER_TOLERANCE * tolerance
+
+
+def test_a_contact_that_grows_within_a_step_wears_there(tmp_path) -> None:
+    """In one step the slip zone is worn off as far as the contact reaches, so that it is free."""
+    errors(tmp_path, ("P: 700 N/mm", "Qx", "134.4 N/mm"), 40, ", cycles: 3e7")
+    with h5py.File(tmp_path / "out" / "results.h5") as results:
+        last = max(results["surfaces/interface"])
+        depth = np.subtract(
+            *(results[f"surfaces/interface/{n}/body_2"][:] for n in (last, "00000"))
+        )
+        pressure = results[f"contact/interface/{last}/pressure"][:]
+        unworn = results["contact/interface/00000/pressure"][:]
+    worn, grown = depth > 1e-3 * depth.max(), (pressure > 0.0) & (unworn == 0.0)
+    assert np.count_nonzero(grown) >= 2
+    assert worn[grown].all()
+    assert pressure[worn].max() < 1e-3 * pressure.max()
 
 
 def test_a_cylinder_that_slides_has_no_such_border(tmp_path) -> None:

@@ -42,6 +42,9 @@ from workflow.models.vibration.excitation import Driving
 FRICTION_CHANGE = 0.03
 # Steps of each branch of the half-space loop.
 LOOP_INCREMENTS = 12
+# Tolerance of the contact solver unless the case gives one: tighter than that of wear, because the
+# damping of small motions is a small difference of large forces.
+SOLVED = 1e-8
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,7 @@ class VibratingContact:
         resolution: Resolution,
     ) -> None:
         self._case, self.rig, self.driving = case, rig, driving
+        self._tolerance = case.contact.tolerance or SOLVED
         self._force, self._frequency, self._resolution = force, frequency, resolution
         self.grid = Grid.covering(case.contact.size, case.contact.grid)
         pair = ElasticPair(case.material(1), case.material(2))
@@ -160,8 +164,7 @@ class VibratingContact:
 
         Raises ContactFailure if it does not converge.
         """
-        half_space, tolerance = self._contact.half_space, self._case.contact.tolerance
-        contact = FrictionalContact(half_space, cycle.friction, tolerance)
+        contact = FrictionalContact(self._contact.half_space, cycle.friction, self._tolerance)
         moments = None if self._tilt == "held" else (0.0, 0.0)
         path = LoopPath(self.load, amplitude, increments=LOOP_INCREMENTS, moments=moments)
         try:
@@ -176,12 +179,11 @@ class VibratingContact:
         The motion is solved from that of the state before. Raises ContactFailure where contact or
         motion are not found.
         """
-        tolerance = self._case.contact.tolerance
         start = state.starts.get(0)
         try:
             slipping = partial_slip_curve(
                 *(self._contact, state.surfaces.gap, self.load),
-                tolerance=tolerance,
+                tolerance=self._tolerance,
                 start=start,
                 tilt=self._tilt,
             )
@@ -194,7 +196,7 @@ class VibratingContact:
         cycle = ParallelSliders(sliders).settle(motion.coefficients, at.basis, at.weights, at.lead)
         path, adjusted = self._path(slipping, sliders, cycle.by_slider)
         wearing = WearingContact(
-            self._contact, self._laws, friction, self._cycle(path), tolerance, start=motion
+            self._contact, self._laws, friction, self._cycle(path), self._tolerance, start=motion
         )
         return ContactCycle(
             state, friction, slipping, sliders, motion, cycle.by_slider, path, adjusted, wearing

@@ -40,7 +40,7 @@ def contact_of(case: WearCase, name: str) -> Contact:
         method=settings.method,
         link=settings.link,
         gross_slip=settings.gross_slip,
-        tolerance=settings.tolerance,
+        tolerance=case.contact_tolerance,
     )
 
 

@@ -24,9 +24,10 @@ from workflow.models.uncoupled.body_pair import BodyPairSource
 from workflow.models.wear import WearModel
 
 # Errors due to the contact solver's tolerance, relative to the tolerance. In depth and volume at
-# most 0.35 was found for tolerances from 1e-3 to 1e-6 on the flanks of two dovetails; in pressures,
-# for 5e-5, 1.1 on unworn and 32 on worn contacts (dovetails, a ball and a cylinder).
-ERROR_PER_TOLERANCE, ON_PRESSURES = 0.5, {"peak_pressure": 2.0, "worn_peak_pressure": 50.0}
+# most 0.35 was found for tolerances from 1e-3 to 1e-6 on the flanks of two dovetails, and 6 in a
+# cylinder in partial slip that is worn to its limit; in pressures, for 5e-5, 1.1 on unworn and 32
+# on worn contacts (dovetails, a ball and a cylinder).
+ERROR_PER_TOLERANCE, ON_PRESSURES = 10.0, {"peak_pressure": 2.0, "worn_peak_pressure": 50.0}
 # Relative uncertainty of parts, which remains where their signs cancel.
 UNCERTAIN = 0.5
 

@@ -33,7 +33,12 @@ from workflow.models.budget import probe_models, probe_runs
 from workflow.models.budget.budget import error_budget, followed
 from workflow.models.budget.names import PARTS
 from workflow.models.budget.outcome import InterfaceOutcome, peak_change
-from workflow.models.budget.parts import UNCERTAIN, ResultError, peak_lowered
+from workflow.models.budget.parts import (
+    ERROR_PER_TOLERANCE,
+    UNCERTAIN,
+    ResultError,
+    peak_lowered,
+)
 from workflow.models.budget.probe_models import ProbeModels, late, scaled
 from workflow.models.budget.probe_runs import STEPS, Numbers, probe_run
 from workflow.models.contact import Contact, Wear
@@ -460,7 +465,7 @@ def test_what_no_probe_run_judges_is_unknown() -> None:
     assert depth.parts["mesh"] is None
     assert "mesh" in depth.unknown
     assert "coupling" not in depth.parts
-    assert depth.parts["solver"] == 0.5 * contact.tolerance
+    assert depth.parts["solver"] == ERROR_PER_TOLERANCE * contact.tolerance
     assert "unknown" in str(budget)
 
 

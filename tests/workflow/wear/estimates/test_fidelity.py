@@ -210,15 +210,16 @@ def test_steps_leave_no_more_than_their_tolerance(plane_path, tmp_path):
         assert np.max(np.abs(reached / limit - 1.0)) <= steps.error == tolerance
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, slow(2e-4)])
-def test_tolerance_leaves_half_of_itself(case, tolerance):
-    """The error of depth and volume is half of the tolerance if flanks carry differently."""
+@pytest.mark.parametrize("allowed", [1e-2, slow(2e-3)])
+def test_the_tolerance_leaves_its_share_where_flanks_carry_differently(case, allowed):
+    """Where faces slide as a whole the error is even below half of the tolerance."""
     case = changed(case, {"load_path.aerodynamic_moment": 3e4, "friction.coefficient": 0.25})
-    section = plane_section(case)
+    section, chosen = plane_section(case), decisions.choose_tolerance(case, allowed)
+    tolerance = chosen.value
+    assert chosen.error == pytest.approx(allowed)
     loose, tight = (
         section_wear(changed(section, {"contact.tolerance": t})) for t in (tolerance, 1e-9)
     )
-    assert decisions.choose_tolerance(case, tolerance).value == tolerance
     for flank, quantities in tight.items():
         for name, value in quantities.items():
             assert loose[flank][name] == pytest.approx(value, rel=0.5 * tolerance)

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from workflow.analyses.contact.case import HEIGHTS
 from workflow.analyses.wear.approximations.approximation import Rung, Settings, entry_at
+from workflow.analyses.wear.case.base import WearCase
 from workflow.case.sections import Case
 
 # Refinements of a contact grid along each direction. A grid twice as fine takes four times as long
@@ -66,7 +67,8 @@ def grids(case: Case) -> Iterator[Rung]:
 
 def tolerances(case: Case) -> Iterator[Rung]:
     """Yield looser tolerances of the contact solver, that of the case, and a tighter one."""
-    baseline = entry_at(case, "contact.tolerance")
+    given = entry_at(case, "contact.tolerance")
+    baseline = case.contact_tolerance if isinstance(case, WearCase) else given
     looser = [tolerance for tolerance in TOLERANCES if tolerance > baseline]
     for tolerance in (*looser, baseline, max(FINER_TOLERANCE * baseline, 1e-12)):
         yield Rung(f"{tolerance:.0e}", {"contact.tolerance": tolerance}, tolerance)

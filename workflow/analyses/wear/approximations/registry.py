@@ -23,7 +23,7 @@ APPROXIMATIONS = (
     ),
     Approximation(
         *("tolerance", "tolerance of the contact solver", ladders.tolerances),
-        entries=("contact.tolerance",),
+        entries=("contact.tolerance", "contact.grid"),
         order=1.0,
         decide=decisions.choose_tolerance,
         remedy=Remedy("solver", "contact.tolerance"),

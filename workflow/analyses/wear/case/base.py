@@ -36,6 +36,8 @@ RESERVED = (
     *("title", "assumed", "per_length", "cycles", "jumps", "work", "structure", "kinetics"),
     *("surfaces", "warnings", "seconds", "versions", "choice"),
 )
+# Tolerance of the contact solver over the accuracy: its error is then negligible.
+SOLVED = 1e-3
 # For automatic increments: the number per leg that leaves an error of about 1 %, from seven
 # dovetails, and the largest number ever chosen for a cycle.
 EXPECTED_INCREMENTS, MOST_INCREMENTS = 11, 1000
@@ -105,6 +107,12 @@ class WearCase(WithScans, Case):
         "probed",
         default="probed",
     )
+
+    @property
+    def contact_tolerance(self) -> float:
+        """Relative tolerance of the contact solver."""
+        given = self.contact.tolerance
+        return SOLVED * self.accuracy if given is None else given
 
     def material(self, number: int) -> ElasticMaterial:
         """Return the material of body ``number``, 1 or 2."""

@@ -132,11 +132,11 @@ class ContactSection(Section):
         "force",
         default="force",
     )
-    tolerance: Tolerance = entry(
-        "relative tolerance of equilibrium and complementarity; of shear a hundredth of it, down "
-        "to 1e-8 [1]",
+    tolerance: Tolerance | None = entry(
+        "relative tolerance of equilibrium and complementarity, of shear a hundredth of it but not "
+        "below 1e-8; by default a thousandth of accuracy [1]",
         1e-8,
-        default=1e-8,
+        default=None,
     )
 
 

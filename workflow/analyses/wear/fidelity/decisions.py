@@ -292,9 +292,9 @@ def estimate(
 
 
 def choose_tolerance(case: DovetailCase, allowed: float) -> Decision:
-    """Choose the share of the error as tolerance of the contact solver, whose error is smaller."""
-    tolerance = max(min(allowed, LOOSEST_TOLERANCE), 1e-12)
-    why = "its share of the error: depth and volume were within half of it"
+    """Choose the tolerance of the contact solver whose error is the share of the error."""
+    tolerance = max(min(allowed / ERROR_PER_TOLERANCE, LOOSEST_TOLERANCE), 1e-12)
+    why = f"errors of depth and volume were at most {ERROR_PER_TOLERANCE:g} times the tolerance"
     error = ERROR_PER_TOLERANCE * tolerance
     return Decision({"contact.tolerance": tolerance}, why, allowed, error)
 
