@@ -19,6 +19,7 @@ Solvers
     - ``LoopPath``: an imposed oscillating motion or force.
     - ``march_loop``: the resulting hysteresis loop, with stiffness and friction.
     - ``partial_slip_curve``: force against motion up to sliding, from normal problems alone.
+    - ``steady_rolling``: creep forces of bodies that roll, and where they stick and slip.
     - ``SubsurfaceStress``: stress inside either body under the tractions.
     - ``von_mises``, ``principal_stresses``: equivalent and principal stresses.
 
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     from sa_solver.contact_state import ContactLoad
     from sa_solver.cycles.history import ContactLoadPath, march_history
     from sa_solver.cycles.partial_slip import partial_slip_curve
+    from sa_solver.cycles.rolling import steady_rolling
     from sa_solver.cycles.tangential_loop import LoopPath, march_loop
     from sa_solver.dissimilar.contact import CoupledContact
     from sa_solver.errors import ConvergenceError, FretscaleError, InputError
@@ -84,6 +86,7 @@ __all__ = [
     "march_loop",
     "partial_slip_curve",
     "principal_stresses",
+    "steady_rolling",
     "von_mises",
 ]
 
