@@ -3,6 +3,10 @@
 Zero padding to at least ``2n - 1`` cells makes the circular convolution with the influence
 coefficients equal to the linear one (Liu, Wang & Liu 2000, Wear 243, 101,
 doi:10.1016/S0043-1648(00)00427-0). On a line grid the same holds for half-planes in plane strain.
+
+A periodic half-space repeats its grid along both axes without end, and needs no padding. A wave of
+pressure with the wave number k displaces the surfaces by 2/(E* k) of its amplitude (Johnson 1985,
+Contact Mechanics, section 13.2); a uniform pressure moves them as rigid bodies, which is left out.
 """
 
 from __future__ import annotations
@@ -14,7 +18,7 @@ import numpy as np
 from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.half_space.influence import X, Y, Z
-from sa_solver.half_space.symbols import Coefficients, symbol_of
+from sa_solver.half_space.symbols import Coefficients, symbol_of, wave_symbol
 from sa_solver.transforms.padded import SpectralFilter, Transform
 from sa_solver.transforms.pruned import LARGE
 from sa_solver.types import Array, ElasticPair, Grid
@@ -71,20 +75,29 @@ class HalfSpace:
     0.9726 um, Love 0.9726 um
     """
 
-    def __init__(self, grid: Grid, pair: ElasticPair, datum: float | None = None) -> None:
+    def __init__(
+        self,
+        grid: Grid,
+        pair: ElasticPair,
+        datum: float | None = None,
+        *,
+        periodic: bool = False,
+    ) -> None:
         """Prepare the convolutions on ``grid`` for the bodies ``pair``.
 
         ``datum`` [mm] is the distance from a line force at which its displacement vanishes; it is
-        used on line grids only. Raises InputError for a datum shorter than the grid.
+        used on line grids only. A ``periodic`` half-space has normal contacts only: its
+        displacements are relative to their mean. Raises InputError for a datum shorter than the
+        grid.
         """
-        self.grid, self.pair = grid, pair
+        self.grid, self.pair, self.periodic = grid, pair, periodic
         self.datum = DATUM * grid.size[0] if datum is None else checks.number("datum", datum)
         if grid.line and not grid.size[0] <= self.datum < np.inf:
             raise InputError(
                 f"datum {self.datum:g} mm is not between the width of the grid, "
                 f"{grid.size[0]:g} mm, and infinity: give the depth of the bodies"
             )
-        self.padded = padded_shape(grid)
+        self.padded = grid.shape if periodic else padded_shape(grid)
         self._coefficients = Coefficients(grid, pair, self.datum, self.padded)
         self.count = 0
         self._filters: dict[tuple[Components, Components], SpectralFilter] = {}
@@ -95,7 +108,7 @@ class HalfSpace:
 
     def on(self, grid: Grid) -> HalfSpace:
         """Return the same bodies on another ``grid``."""
-        half_space = HalfSpace(grid, self.pair, self.datum)
+        half_space = HalfSpace(grid, self.pair, self.datum, periodic=self.periodic)
         half_space._coefficients = Coefficients(
             grid, self.pair, self.datum, half_space.padded, self._coefficients
         )
@@ -134,7 +147,8 @@ class HalfSpace:
 
         The symbol ``(mx, my//2 + 1)`` holds the eigenvalues of the influence coefficients, made
         periodic with ``period``, the padded shape by default: each displacement is that of the
-        nearest image of the source. The matrix of symbols is Hermitian. It is made real and
+        nearest image of the source. That of a periodic half-space is exact for waves, and has the
+        period of the grid. The matrix of symbols is Hermitian. It is made real and
         symmetric here by multiplying components along z by the imaginary unit.
         """
         key = (min(row, column), max(row, column), period or self.padded)
@@ -156,6 +170,10 @@ class HalfSpace:
         return self._filters[rows, columns].apply(fields)
 
     def _compute_symbol(self, row: int, column: int, period: GridShape) -> Array:
+        if self.periodic:
+            if (row, column) != (Z, Z):
+                raise InputError("a periodic half-space has no shear: use NormalContact")
+            return wave_symbol(self.grid, self.pair.contact_modulus)
         odd = (row == X) != (column == X), (row == Y) != (column == Y)
         symbol = symbol_of(self._coefficients.quarter(row, column, period), period, odd)
         # The DFT of a kernel that is odd along both axes is minus the sum over sines.

@@ -32,10 +32,12 @@ class NormalPreconditioner:
         """Prepare the inverse of ``half_space``."""
         self.half_space = half_space
         shape = half_space.grid.shape
-        period = fast_lengths(*shape)
+        period = shape if half_space.periodic else fast_lengths(*shape)
         self._transform = half_space.transform(shape, period, 1)
         symbol = half_space.symbol(Z, Z, period)
         self._symbol = np.maximum(symbol, SMALLEST_RELATIVE_EIGENVALUE * symbol.max())
+        if half_space.periodic:
+            self._symbol[0, 0] = symbol.max()  # The load decides the mean pressure.
         self._parts: list[tuple[Array | None, SpectralFilter]] = []
         self.include(None)
 

@@ -115,6 +115,20 @@ def symbol_of(quarter: Array, period: Period, odd: Odd) -> Array:
     return np.ascontiguousarray(continued(sums, 0, period[0], odd[0]))
 
 
+def wave_symbol(grid: Grid, contact_modulus: float) -> Array:
+    """Return the displacements under unit waves of pressure on a periodic grid [mm/MPa].
+
+    They are 2/(E* k) at the frequencies of numpy's ``rfft2``, ``(nx, ny//2 + 1)``, and 0 for the
+    mean pressure. E* is the ``contact_modulus`` [MPa].
+    """
+    (nx, ny), (dx, dy) = grid.shape, grid.pitch
+    along_x, along_y = np.fft.fftfreq(nx, dx)[:, None], np.fft.rfftfreq(ny, dy)
+    wave_number = 2.0 * np.pi * np.hypot(along_x, along_y)
+    wave_number[0, 0] = np.inf
+    symbol: Array = 2.0 / (contact_modulus * wave_number)
+    return symbol
+
+
 def _half_spectrum(kernel: Array, axis: int, period: int, odd: bool) -> Array:
     """Return such sums along one ``axis``, at frequencies 0 to ``period``//2."""
     spectrum = np.fft.rfft(continued(kernel, axis, period, odd), axis=axis)

@@ -116,8 +116,10 @@ class BoundConjugateGradients:
 
     def _converged(self, tolerance: float) -> bool:
         """Return whether the residuals are within ``tolerance`` and no pressure is negative."""
-        # The scale of the last revision is accurate enough to rule out most iterates.
-        if self._pressure.min() < 0.0 or -self._gap.min() > 2.0 * tolerance * self._scale:
+        # The scale of the last revision is accurate enough to rule out most iterates. On a periodic
+        # grid that scale is 0 at first, under a uniform pressure.
+        deepest = 2.0 * tolerance * (self._scale or np.inf)
+        if self._pressure.min() < 0.0 or -self._gap.min() > deepest:
             return False
         return normal_residuals(self._problem, self._iterate()).largest <= tolerance
 

@@ -226,6 +226,10 @@ class NormalContact:
         self._check_start(start)
         tolerance = checks.number("tolerance", tolerance, above=0.0, error=NormalContactError)
         control = NormalControl(P, Mx, My, approach, tilt_x, tilt_y)
+        if self.half_space.periodic and (Mx or My or tilt_x or tilt_y or control.free[1:]):
+            raise NormalContactError(
+                "a periodic contact does not turn: leave out moments and tilts"
+            )
         control.check_moments(self.grid)
 
         def pressed(height: Array) -> NormalState:
@@ -307,7 +311,7 @@ class NormalContact:
         motions[free] = iterate.rigid / mode_lengths(self.grid)[free]
         force = iterate.pressure * self.grid.cell_area
         along_x, along_y = force.sum(axis=1), force.sum(axis=0)
-        border_load = border_share(iterate.pressure)
+        border_load = 0.0 if self.half_space.periodic else border_share(iterate.pressure)
         failure = "" if converged else _failure(problem, iterate, residuals, tolerance)
         transformed = sum(count * nx * ny for (nx, ny), count in problem.work.items())
         return NormalState(

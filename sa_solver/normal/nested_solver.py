@@ -19,7 +19,7 @@ from sa_solver.normal.few_cells import solve_few_cells
 from sa_solver.normal.problem import Iterate, NormalProblem, normal_residuals
 from sa_solver.normal.splitting import solve_by_splitting
 from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, NormalModes
-from sa_solver.types import Array
+from sa_solver.types import Array, Mask
 
 COARSE_TOLERANCE = 1e-3
 """Tolerance of residuals on coarser grids, where the error of the pressure at the edge of the
@@ -56,7 +56,7 @@ class NestedSolver:
 
         The last iterate on the whole grid and the name of the method that found it are returned.
         """
-        box = Box.around(pressure > 0.0)
+        box = self._box(pressure > 0.0)
         while True:
             box, result = self._search(problem, box, pressure, displacement, tolerance)
             iterate = result.iterate
@@ -73,6 +73,12 @@ class NestedSolver:
                 return iterate, "conjugate gradients"
             missed[box.window] = True
             box = Box.around(missed)
+
+    def _box(self, cells: Mask) -> Box:
+        """Return a box around ``cells``, or all cells of a periodic half-space."""
+        return (
+            Box.whole(self.half_space.grid.shape) if self.half_space.periodic else Box.around(cells)
+        )
 
     def _search(
         self,
@@ -128,7 +134,7 @@ class NestedSolver:
         start = solver.cold_start(coarse)
         if start is None:
             return None
-        box = Box.around(start > 0.0)
+        box = solver._box(start > 0.0)
         box, result = solver._search(coarse, box, start, None, COARSE_TOLERANCE)
         pressure = transfer.interpolated(box.on_whole_grid(result.iterate.pressure))
         return problem.modes.balance(pressure, problem.target)

@@ -134,13 +134,13 @@ def normal_residuals(problem: NormalProblem, iterate: Iterate) -> NormalResidual
     first = 1 if APPROACH in problem.modes.free else 0
     gap = iterate.gap(problem)
     penetration, complementarity = contact_residuals(iterate.pressure, iterate.displacement, gap)
-    wear = np.minimum(problem.local_displacement(iterate.pressure), np.abs(gap))
+    worn = float(np.minimum(problem.local_displacement(iterate.pressure), np.abs(gap)).max())
     return NormalResiduals(
         float(missing[:first].max(initial=0.0)),
         float(missing[first:].max(initial=0.0)),
         penetration,
         complementarity,
-        float(wear.max() / iterate.displacement.max()),
+        worn / float(iterate.displacement.max()) if worn else 0.0,
     )
 
 
