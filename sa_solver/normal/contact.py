@@ -36,7 +36,7 @@ from sa_solver.normal.problem import (
     normal_residuals,
 )
 from sa_solver.normal.separation import separating_tilt
-from sa_solver.rigid_modes import APPROACH, NormalModes, mode_lengths
+from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, NormalModes, mode_lengths
 from sa_solver.surfaces.absent_cells import without_absent
 from sa_solver.types import Array, Grid
 
@@ -226,10 +226,8 @@ class NormalContact:
         self._check_start(start)
         tolerance = checks.number("tolerance", tolerance, above=0.0, error=NormalContactError)
         control = NormalControl(P, Mx, My, approach, tilt_x, tilt_y)
-        if self.half_space.periodic and (Mx or My or tilt_x or tilt_y or control.free[1:]):
-            raise NormalContactError(
-                "a periodic contact does not turn: leave out moments and tilts"
-            )
+        if self.half_space.periodic:
+            _check_periodic(height, control)
         control.check_moments(self.grid)
 
         def pressed(height: Array) -> NormalState:
@@ -351,6 +349,18 @@ def _separated(problem: NormalProblem) -> Array | None:
     touching = np.zeros(len(problem.modes.free))
     touching[0] = problem.height.min()
     return touching
+
+
+def _check_periodic(height: Array, control: NormalControl) -> None:
+    """Raise NormalContactError for what a periodic contact cannot do."""
+    free, (delta, *tilts) = control.free, control.motions
+    if any(tilts) or TILT_X in free or TILT_Y in free:
+        raise NormalContactError("a periodic contact does not turn: leave out moments and tilts")
+    if APPROACH not in free and delta >= (mean := float(height.mean())):
+        raise NormalContactError(
+            f"a periodic contact is full at an approach of {mean:g} mm, the mean of its heights, "
+            "under any larger load: impose P instead"
+        )
 
 
 def checked_heights(

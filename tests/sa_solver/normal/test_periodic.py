@@ -95,11 +95,14 @@ def test_a_large_local_compliance_evens_out_the_pressure() -> None:
     np.testing.assert_allclose(state.pressure, 100.0, rtol=1e-4)
 
 
-def test_shear_and_tilt_are_refused() -> None:
+def test_what_a_periodic_contact_cannot_do_is_refused() -> None:
     grid = Grid.covering((1.0, 1.0), (16, 16))
     contact, height = periodic(grid), rough(16)
-    with pytest.raises(InputError, match="turn"):
-        contact.solve(height, P=1.0, Mx=0.0)
+    for entry in ({"Mx": 0.0}, {"tilt_y": 1e-3}):
+        with pytest.raises(InputError, match="turn"):
+            contact.solve(height, P=1.0, **entry)
+    with pytest.raises(InputError, match="is full at an approach"):
+        contact.solve(height, approach=1.001 * float(height.mean()) + 1e-6)
     steel = Material(young=210e3, poisson=0.3)
     sheared = FrictionalContact(HalfSpace(grid, ElasticPair(steel, steel), periodic=True), 0.5)
     with pytest.raises(InputError, match="no shear"):
