@@ -27,10 +27,6 @@ from sa_solver.types import Array
 MOST_LENGTHS = 20
 """Lengths of the contact that it rolls at most. From rest 3 or 4 make it steady to 1e-3."""
 
-SHIFTS = {"creepage_x": "shift_x", "creepage_y": "shift_y", "spin": "twist"}
-FORCES = {"creepage_x": "Qx", "creepage_y": "Qy", "spin": "Mz"}
-FIELDS = ("traction", "displacement", "slip", "gap", "sticking")
-
 
 class RollingError(ConvergenceError):
     """Rolling that does not become steady, or a contact problem that did not converge."""
@@ -135,15 +131,17 @@ def steady_rolling(
     checks.number("P", P, above=0.0)
     tolerance = checks.number("tolerance", tolerance, above=0.0)
     rates = {"creepage_x": creepage_x, "creepage_y": creepage_y, "spin": spin}
-    forces = {"creepage_x": Qx, "creepage_y": Qy, "spin": Mz}
-    given = _imposed(rates, forces, contact.grid.line)
     pitch = contact.grid.pitch[0]
+    step = _one_cell(P, pitch, rates, {"Qx": Qx, "Qy": Qy, "Mz": Mz})
+    if contact.grid.line and (step.values[5] or not step.motion[5]):
+        raise InputError("a line contact has no spin: leave out spin and Mz, or take a grid")
     state = _checked(contact.advance(contact.unloaded_state(height), height, ContactLoad(P=P)))
     length = int(np.count_nonzero(state.pressure.any(axis=1)))
     limit = contact.friction * float(state.pressure.max()) or 1.0
     shears, change = deque([state.shear], maxlen=length + 1), np.inf
     for rolled in range(1, MOST_LENGTHS * length + 1):
-        before, load = state, _load(P, given, state, pitch)
+        before = state
+        load = ContactLoad(step.values + np.where(step.motion, before.rigid, 0.0), step.motion)
         start = ContactStart(before.pressed, before.shear, before.slipping, None, before.traction)
         state = _checked(contact.advance(_rolled(before), height, load, start))
         shears.append(state.shear)
@@ -159,38 +157,22 @@ def steady_rolling(
     )
 
 
-def _imposed(
-    rates: dict[str, float | None], forces: dict[str, float | None], line: bool
-) -> dict[str, tuple[bool, float]]:
-    """Return for each direction whether a force is imposed, and the force or the creepage."""
-    given = {}
-    for name, rate in rates.items():
-        force = forces[name]
+def _one_cell(
+    P: float, pitch: float, rates: dict[str, float | None], forces: dict[str, float | None]
+) -> ContactLoad:
+    """Return the load of rolling by one cell, with motions since the cell before."""
+    entries: dict[str, Any] = {}
+    for shift, (rate_name, rate), (force_name, force) in zip(
+        ("shift_x", "shift_y", "twist"), rates.items(), forces.items(), strict=True
+    ):
         if rate is not None and force is not None:
             raise InputError(
-                f"both {name} and {FORCES[name]} are given: the other follows from one"
+                f"both {rate_name} and {force_name} are given: the other follows from one"
             )
-        value = checks.number(
-            *((FORCES[name], force) if force is not None else (name, rate or 0.0))
-        )
-        given[name] = force is not None, value
-    if line and given["spin"] != (False, 0.0):
-        raise InputError("a line contact has no spin: leave out spin and Mz, or take a grid")
-    return given
-
-
-def _load(
-    P: float, given: dict[str, tuple[bool, float]], before: ContactState, pitch: float
-) -> ContactLoad:
-    """Return the load that rolls by one cell."""
-    entries: dict[str, Any] = {}
-    for (name, (forced, value)), reached in zip(
-        given.items(), before.rigid[list(PLANAR)], strict=True
-    ):
-        if forced:
-            entries[FORCES[name]] = value
+        if force is None:
+            entries[shift] = pitch * checks.number(rate_name, rate or 0.0)
         else:
-            entries[SHIFTS[name]] = float(reached) + value * pitch
+            entries[force_name] = checks.number(force_name, force)
     return ContactLoad(P=P, **entries)
 
 
@@ -203,14 +185,14 @@ def _checked(state: ContactState) -> ContactState:
 
 
 def _rolled(state: ContactState) -> ContactState:
-    """Return a state as it lies on the grid that has moved by one cell along x.
+    """Return a state whose tractions and displacements lie on the grid moved by one cell along x.
 
-    The surfaces that enter are free of tractions. Their displacement is taken as that of their
-    neighbours: it does not matter before they come into contact.
+    The next increment starts from nothing else. The surfaces that enter are free of tractions.
+    Their displacement is taken as that of their neighbours: it does not matter before they come
+    into contact.
     """
 
-    def moved(name: str) -> Any:
-        field = getattr(state, name)
+    def moved(field: Array) -> Array:
         return np.concatenate([field[..., 1:, :], field[..., -1:, :]], axis=-2)
 
-    return replace(state, **{name: moved(name) for name in FIELDS})
+    return replace(state, traction=moved(state.traction), displacement=moved(state.displacement))
