@@ -16,6 +16,7 @@ import numpy as np
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactState
+from sa_solver.cycles.increments import slip_of_states
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
@@ -27,13 +28,7 @@ from wear.contact.moving import followed, passages
 from wear.contact.settings import InterfaceSettings
 from wear.contact.tractions import ContactFields, CycleTractions, acting_slip
 from wear.laws import EvolvingLaw
-from wear.steps.full_cycle import (
-    CycleStart,
-    march_cycle,
-    slip_around,
-    slip_known,
-    starts_near,
-)
+from wear.steps.full_cycle import CycleStart, march_cycle, slip_around, slip_known, starts_near
 from wear.steps.marching import advance_cycles, rest
 from wear.steps.steppers import first_cycles
 from wear.steps.stepping import (
@@ -402,7 +397,8 @@ class InterfaceContact:
         if settings.method == "full":
             cycle = self._half_space_cycle(state, sliding, moved)
             slip = np.stack([increment.slip for increment in cycle])
-            acting = acting_slip(slip_around(cycle, state.loads, self.grid), state.loads)
+            loads, sizes = state.loads, slip_around(cycle, state.loads, self.grid)
+            acting = slip_of_states(sizes, loads.P > 0.0, loads.missions)
             sliding = replace(sliding, slip=acting)
             if not self.pair.similar:
                 lift = self._contact.half_space.normal_under_shear

@@ -85,18 +85,17 @@ def slip_known(cycle: Sequence[ContactState], loads: LoadHistory) -> Mask | None
 
 
 def slip_around(cycle: Sequence[ContactState], loads: LoadHistory, grid: Grid) -> Array:
-    """Return the slip of each increment ``(t, 2, nx, ny)`` [mm], also around the contact.
+    """Return the size of the slip of each increment ``(t, nx, ny)`` [mm], also around the contact.
 
     Cells that are apart slip as the nearest cell in contact. They do not wear, because nothing
     presses there, but a contact that grows onto them within a wear step wears them.
     """
-    slip, known = np.stack([state.slip for state in cycle]), slip_known(cycle, loads)
+    sizes, known = np.stack([np.hypot(*state.slip) for state in cycle]), slip_known(cycle, loads)
     assert known is not None
-    for increment, pressed in zip(slip, known, strict=True):
-        if pressed.any():
-            around = [of_nearest(component, pressed, grid.pitch) for component in increment]
-            increment[:] = np.where(pressed, increment, around)
-    return slip
+    for size, pressed in zip(sizes, known, strict=True):
+        if pressed.any() and not pressed.all():
+            size[~pressed] = of_nearest(size, pressed, grid.pitch)[~pressed]
+    return sizes
 
 
 def march_cycle(
