@@ -20,7 +20,7 @@ joint = fretscale.DovetailJoint(
     blade=titanium,
     missions=(fretscale.Mission(22, 8, 6000.0 * pi / 30.0, 0.8e-3, 400.0, 30e3),),
 )  # fmt: skip
-contact = fretscale.Contact((128, 256), (titanium, titanium), (law, law), friction=0.4)
+contact = fretscale.Contact((96, 192), (titanium, titanium), (law, law), friction=0.4)
 model = fretscale.WearModel(joint, contact, fretscale.Wear(cycles=3e5), fretscale.Stress())
 
 if __name__ == "__main__":

@@ -348,7 +348,7 @@ WITH_SECTION = {
     "structure.cyclic.": [SECTOR],
 }
 # Cells of the templates that may take heights.
-CELLS = {"mesh": (128, 256), "resultants": (128, 256)}
+CELLS = {"mesh": (96, 192), "resultants": (96, 192)}
 CELLS |= dict.fromkeys(("bodies", "bodies_wear"), (128, 128))
 CELLS |= dict.fromkeys(("line", "line_wear"), (512,))
 

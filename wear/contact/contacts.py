@@ -14,6 +14,7 @@ from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceContact, InterfaceState
+from wear.contact.settings import InterfaceSettings
 from wear.steps.marching import advance_cycles
 from wear.steps.steppers import Contact, Stepper
 from wear.steps.stepping import failures_of
@@ -127,6 +128,24 @@ def call_in_turn(
         with failures_of(contact.name):
             answers.append(function(contact, share))
     return answers
+
+
+def answering(
+    settings: InterfaceSettings, solved: Callable[[], None]
+) -> Callable[[Callable[[Any, Any], Answer], Any], Answer]:
+    """Return a function that answers calls for the contact of these settings.
+
+    ``solved`` is called after each increment of a cycle with friction. A process that answers for
+    one contact needs nothing else of a model.
+    """
+    contact = InterfaceContact(settings)
+    contact.solved = solved
+
+    def answer(function: Callable[[Any, Any], Answer], share: Any) -> Answer:
+        (result,) = call_in_turn([contact], function, [share])
+        return result
+
+    return answer
 
 
 class Contacts:

@@ -90,7 +90,7 @@ class WearModel:
     >>> model = fretscale.wear_model("cases/dovetail.yaml")
     >>> coarse = replace(model, contacts=replace(model.contacts, grid=(64, 128)))
     >>> print(model.contact("intrados").grid, coarse.contact("intrados").grid)
-    (128, 256) (64, 128)
+    (96, 192) (64, 128)
 
     The example of :class:`fretscale.UncoupledSource` runs a model.
     """

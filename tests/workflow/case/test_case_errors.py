@@ -23,7 +23,7 @@ WRONG = [
     ("45 deg", "95 deg", "structure.flank_angle"),
     ("[8, 14]", "[8, 14.5]", "load_path.increments.1"),
     ("[8, 14]", "22", "load_path.increments"),
-    ("[128, 256]", "[128, 256, 64]", "contact.grid"),
+    ("[96, 192]", "[96, 192, 64]", "contact.grid"),
     ("30 mm ", "0.9 mm ", "structure.edge_width"),
     ("1.5 mm ", "4 mm ", "structure.edge_width"),
     ("end_width: 3 mm", "end_width: 30 mm", "structure.end_width"),

@@ -39,7 +39,7 @@ def test_dump_has_every_default(dovetail_path, dovetail_text):
     written = YAML(typ="safe").load(dump_case(parse_case(short, "short")))
     assert written["mesh"] == {"flank_nodes": [21, 27], "size": 12.0, "notch": 16, "order": 2}
     assert written["contact"] == {
-        "grid": [128, 256],
+        "grid": [96, 192],
         "method": "normal",
         "link": "corrected",
         "gross_slip": "force",

@@ -70,7 +70,7 @@ def test_cases_of_the_repository_check(path):
 def test_check_prints_the_grid_and_the_increments(dovetail_path):
     result = invoke("check", dovetail_path)
     assert result.exit_code == 0
-    assert "128 x 256 cells" in result.stdout
+    assert "96 x 192 cells" in result.stdout
     assert "22 increments" in result.stdout
 
 

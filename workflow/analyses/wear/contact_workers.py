@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from functools import partial
 from typing import Any
 
 from sa_solver.types import Tally, unseen
-from wear.contact.contacts import Answer, call_in_turn
-from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.translation import face_contact
-from workflow.models.loads import ContactFace
+from wear.contact.contacts import Answer, answering
+from workflow.models.contact import FaceContact
 from workflow.models.progress import ReportsProgress
-from workflow.shell.processes import Done, Workers, workers
+from workflow.shell.processes import Workers, workers
 
 # Estimated ratio of frictional increments in the first jump to those in the first cycle. Implicit
 # steps solve the cycle on the new surfaces; later jumps, which have a coarse companion, also solve
@@ -21,23 +18,9 @@ from workflow.shell.processes import Done, Workers, workers
 FIRST_JUMP = 2
 
 
-def contact_workers(
-    case: WearCase, faces: Sequence[ContactFace]
-) -> AbstractContextManager[Workers]:
-    """Start a worker process for every face of a case, and end all of them on exit."""
-    return workers(partial(_worker, case), faces)
-
-
-def _worker(case: WearCase, face: ContactFace, solved: Done) -> Callable[..., Any]:
-    """Return the function that answers for one contact; ``solved`` is called per increment."""
-    contact = face_contact(case, face).contact
-    contact.solved = solved
-
-    def answer(function: Callable[[Any, Any], Any], share: Any) -> Any:
-        (result,) = call_in_turn([contact], function, [share])
-        return result
-
-    return answer
+def contact_workers(stages: Sequence[FaceContact]) -> AbstractContextManager[Workers]:
+    """Start a worker process for each of these contacts, and end all of them on exit."""
+    return workers(answering, [stage.settings for stage in stages])
 
 
 class WorkerCalls(ReportsProgress):

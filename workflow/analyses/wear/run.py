@@ -88,8 +88,11 @@ def _compute(
     faces = meshed_faces(case, source, reporter)
     for face in faces:
         check_section(case, face)
+    with reporter.stage("contact set-up"):
+        contacts = model.face_contacts(source)
     in_workers = _wears_in_workers(case, source)
-    workers = working.enter_context(contact_workers(case, faces if in_workers else ()))
+    alone = contacts.stages if in_workers else ()
+    workers = working.enter_context(contact_workers(alone))
     prepare_loads(source, reporter)
     probe_results = begin_probe_runs(case, model, source, run.worker)
     with one_thread():
@@ -100,11 +103,9 @@ def _compute(
             _check_structure(case, source, reporter)
         if isinstance(case, ResultantsCase):
             warn_of_file(case, reporter)
-        with reporter.stage("contact set-up"):
-            contacts = model.face_contacts(source)
-            if in_workers:
-                call = WorkerCalls(workers, sum(len(history.loads) for history in unworn))
-                contacts = FaceContacts.half_spaces(contacts.stages, call)
+        if in_workers:
+            call = WorkerCalls(workers, sum(len(history.loads) for history in unworn))
+            contacts = FaceContacts.half_spaces(contacts.stages, call)
         state, first = _march(run, model, source, contacts, unworn, steps)
         states = contacts.states(state)
         answers: Callable[[], list[ContactEnd]] = partial(contacts.call, last_cycle, states)

@@ -110,8 +110,8 @@ class ContactSection(Section):
     grid: FaceCells = entry(
         "number of cells along x, along y of every face; for line contacts along x alone, "
         "256 or [256, 1]",
-        [128, 256],
-        default=(128, 256),
+        [96, 192],
+        default=(96, 192),
     )
     method: Literal["normal", "full", "nodes"] = entry(
         "normal: pressure of the half-space, slips of the structure; full: both of the "
