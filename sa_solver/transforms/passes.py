@@ -1,6 +1,6 @@
 """Loops over spectra and fields, by numpy in short computations and compiled in long ones.
 
-Compiled loops take an eighth of numpy's time, but half a second to load, which is longer than many
+Compiled loops take an eighth of numpy's time, but a second or two to load, longer than many
 short computations. Each function here has a compiled function of the same name in
 :mod:`sa_solver.transforms.kernels` that does the same operations in the same order, so that the
 results are the same in every digit.
@@ -21,9 +21,9 @@ from sa_solver.types import Array, Indices
 Spectrum = NDArray[np.complex128]
 Spectra = NDArray[np.complex128]
 
-PAYS = 150_000_000
+PAYS = 500_000_000
 """Numbers processed by numpy after which a process uses the compiled loops. At 3 to 4 ns per number
-numpy has then lost the half second that loading the compiler and the loops takes."""
+numpy has then lost the one and a half seconds that loading the compiler and the loops takes."""
 
 CALL = 3_000
 """Numbers that are counted for each call in addition: a call costs 10 to 20 us, however few numbers
