@@ -26,11 +26,19 @@ from sa_solver.dissimilar.contact import CoupledContact, CoupledContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact, NormalStart, NormalState, checked_heights
-from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
+from sa_solver.rigid_modes import NORMAL, PLANAR
 from sa_solver.tangential.ciavarella_jaeger import first_loading
-from sa_solver.tangential.contact import FrictionLimitError, TangentialContact, TangentialState
+from sa_solver.tangential.contact import (
+    FrictionLimitError,
+    TangentialContact,
+    TangentialState,
+    planar_modes,
+)
 from sa_solver.tangential.gross_slip import SlidingRule, gross_slip, slides, sliding_direction
 from sa_solver.types import Array, Mask
+
+TURNING = (3, 4, 5)
+"""Indices of Mx, My and Mz among the six resultants, and of their motions."""
 
 _State = TypeVar("_State", TangentialState, CoupledContactState)
 
@@ -78,7 +86,7 @@ class FrictionalContact:
         checks.choice("sliding", sliding, get_args(SlidingRule))
         self.half_space, self.grid = half_space, half_space.grid
         self.friction, self.tolerance, self._sliding = friction, tolerance, sliding
-        self._modes = PlanarModes.on(self.grid)
+        self._modes = planar_modes(half_space)
 
     def unloaded_state(self, height: Array, along: Array | None = None) -> ContactState:
         """Return the state of the unloaded bodies, with the gap ``height`` ``(nx, ny)`` [mm].
@@ -116,6 +124,8 @@ class FrictionalContact:
         impossible data the solvers raise NormalContactError or TangentialContactError.
         """
         height = checked_heights(height, self.grid)
+        if self.half_space.periodic:
+            _check_periodic(load)
         guess = start or ContactStart()
         if not self.half_space.pair.similar:
             return self._advance_dissimilar(before, height, load, guess)
@@ -180,6 +190,8 @@ class FrictionalContact:
         )
         if self.grid.line:
             Mx = tilt_x = None
+        if self.half_space.periodic:
+            Mx = My = tilt_x = tilt_y = None
         if start is None and before.pressure.any():
             start = before.pressed
         return self.normal.solve(
@@ -204,7 +216,7 @@ class FrictionalContact:
     ) -> TangentialState:
         names = ("Qx", "Qy", "Mz"), ("shift_x", "shift_y", "twist")
         imposed: dict[str, float] = {}
-        for place, k in enumerate(PLANAR[:2] if self.grid.line else PLANAR):
+        for place, k in enumerate(PLANAR[k] for k in self._modes.free):
             value = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
             imposed[names[load.motion[k]][place]] = float(value)
         return self.tangential.solve(
@@ -240,7 +252,7 @@ class FrictionalContact:
     ) -> tuple[TangentialState, bool]:
         """Return similar bodies in gross slip by the energy of ``load``, and whether they creep."""
         shear = limit * sliding_direction(load.values[1:3])[:, None, None]
-        twist = {} if self.grid.line else {"twist": 0.0}
+        twist = {"twist": 0.0} if len(self._modes.free) == len(PLANAR) else {}
         begin = (shear, None) if guess.shear is None else (guess.shear, guess.slipping)
 
         def solve(shift: Array, tolerance: float, last: TangentialState | None) -> TangentialState:
@@ -458,3 +470,11 @@ class FrictionalContact:
             return self._slip(before, state.pressure > 0.0, offset, state, motion)
 
         return self._slide_by_energy(solve, limit_of, slip_of, before, shear, offset, load, near)[0]
+
+
+def _check_periodic(load: ContactLoad) -> None:
+    """Raise InputError for a load that a periodic contact cannot have."""
+    if load.values[list(TURNING)].any():
+        raise InputError("a periodic contact does not turn: leave out moments and rotations")
+    if load.strain:
+        raise InputError("a periodic contact has no bulk strain: every patch is like the next")

@@ -7,6 +7,7 @@ doi:10.1016/S0043-1648(00)00427-0). On a line grid the same holds for half-plane
 A periodic half-space repeats its grid along both axes without end, and needs no padding. A wave of
 pressure with the wave number k displaces the surfaces by 2/(E* k) of its amplitude (Johnson 1985,
 Contact Mechanics, section 13.2); a uniform pressure moves them as rigid bodies, which is left out.
+The same holds for shear. The bodies must be similar.
 """
 
 from __future__ import annotations
@@ -86,9 +87,9 @@ class HalfSpace:
         """Prepare the convolutions on ``grid`` for the bodies ``pair``.
 
         ``datum`` [mm] is the distance from a line force at which its displacement vanishes; it is
-        used on line grids only. A ``periodic`` half-space has normal contacts only: its
-        displacements are relative to their mean. Raises InputError for a datum shorter than the
-        grid.
+        used on line grids only. The displacements of a ``periodic`` half-space are relative to
+        their mean. Raises InputError for a datum shorter than the grid, and for a periodic
+        half-space of dissimilar bodies.
         """
         self.grid, self.pair, self.periodic = grid, pair, periodic
         self.datum = DATUM * grid.size[0] if datum is None else checks.number("datum", datum)
@@ -96,6 +97,11 @@ class HalfSpace:
             raise InputError(
                 f"datum {self.datum:g} mm is not between the width of the grid, "
                 f"{grid.size[0]:g} mm, and infinity: give the depth of the bodies"
+            )
+        if periodic and not pair.similar:
+            raise InputError(
+                "the bodies of a periodic half-space must be similar: the effect of shear on "
+                "pressure is not computed there"
             )
         self.padded = grid.shape if periodic else padded_shape(grid)
         self._coefficients = Coefficients(grid, pair, self.datum, self.padded)
@@ -171,9 +177,7 @@ class HalfSpace:
 
     def _compute_symbol(self, row: int, column: int, period: GridShape) -> Array:
         if self.periodic:
-            if (row, column) != (Z, Z):
-                raise InputError("a periodic half-space has no shear: use NormalContact")
-            return wave_symbol(self.grid, self.pair.contact_modulus)
+            return wave_symbol(self.grid, self.pair, row, column)
         odd = (row == X) != (column == X), (row == Y) != (column == Y)
         symbol = symbol_of(self._coefficients.quarter(row, column, period), period, odd)
         # The DFT of a kernel that is odd along both axes is minus the sum over sines.

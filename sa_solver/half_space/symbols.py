@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sa_solver.half_space.influence import rectangle_influence, strip_influence
+from sa_solver.half_space.influence import Z, rectangle_influence, strip_influence
 from sa_solver.types import Array, ElasticPair, Grid
 
 Period = tuple[int, int]
@@ -115,18 +115,31 @@ def symbol_of(quarter: Array, period: Period, odd: Odd) -> Array:
     return np.ascontiguousarray(continued(sums, 0, period[0], odd[0]))
 
 
-def wave_symbol(grid: Grid, contact_modulus: float) -> Array:
-    """Return the displacements under unit waves of pressure on a periodic grid [mm/MPa].
+def wave_symbol(grid: Grid, pair: ElasticPair, row: int, column: int) -> Array:
+    """Return displacements ``row`` under unit waves of traction ``column`` on a periodic grid.
 
-    They are 2/(E* k) at the frequencies of numpy's ``rfft2``, ``(nx, ny//2 + 1)``, and 0 for the
-    mean pressure. E* is the ``contact_modulus`` [MPa].
+    They have the frequencies of numpy's ``rfft2``, ``(nx, ny//2 + 1)`` [mm/MPa], and are 0 for the
+    mean traction. With the compliances n, s and v of a ``pair`` of similar bodies, waves of the
+    wave number k at the angle θ to x have n/k under pressure, and (s - v cos²θ)/k, (s - v sin²θ)/k
+    and -v cosθ sinθ/k under shear. These are the transforms of the kernels in
+    :mod:`sa_solver.half_space.influence`.
     """
     (nx, ny), (dx, dy) = grid.shape, grid.pitch
-    along_x, along_y = np.fft.fftfreq(nx, dx)[:, None], np.fft.rfftfreq(ny, dy)
-    wave_number = 2.0 * np.pi * np.hypot(along_x, along_y)
-    wave_number[0, 0] = np.inf
-    symbol: Array = 2.0 / (contact_modulus * wave_number)
-    return symbol
+    along = np.fft.fftfreq(nx, dx)[:, None], np.fft.rfftfreq(ny, dy)[None, :]
+    frequency = np.hypot(*along)
+    frequency[0, 0] = np.inf
+    wave_number = 2.0 * np.pi * frequency
+    if row == column == Z:
+        return np.asarray(pair.normal / wave_number)
+    cosines = along[row] / frequency, along[column] / frequency
+    symbol = (pair.shear * (row == column) - pair.poisson * cosines[0] * cosines[1]) / wave_number
+    if row != column:
+        # A wave of two cells along an axis runs in both directions, which cancel.
+        if nx % 2 == 0:
+            symbol[nx // 2] = 0.0
+        if ny % 2 == 0:
+            symbol[:, ny // 2] = 0.0
+    return np.asarray(symbol)
 
 
 def _half_spectrum(kernel: Array, axis: int, period: int, odd: bool) -> Array:

@@ -192,7 +192,7 @@ class TangentialContact:
         """Prepare the solver for ``half_space``."""
         self.half_space = half_space
         self.grid = half_space.grid
-        self._modes = PlanarModes.on(half_space.grid)
+        self._modes = planar_modes(half_space)
         self._levels: dict[tuple[int, int], ShearLevel] = {}
 
     def solve(
@@ -223,7 +223,7 @@ class TangentialContact:
             Imposed forces [N] and moment [N mm].
         shift_x, shift_y, twist
             Motions [mm, rad] that are imposed instead of Qx, Qy and Mz, where given. A line grid
-            has no twist.
+            and a periodic half-space have no twist.
         tolerance
             Bound on every residual.
         start
@@ -286,6 +286,9 @@ class TangentialContact:
 
         window = []
         for axis, size in enumerate(self.grid.shape):
+            if self.half_space.periodic:
+                window.append(slice(0, size))
+                continue
             pressed = np.flatnonzero(limit.any(axis=1 - axis))
             extent = int(pressed[-1] - pressed[0]) + 1
             length = min(size, -(-extent // BOX_STEP) * BOX_STEP)
@@ -432,10 +435,17 @@ class TangentialContact:
         given |= {name: motion for name, motion in named if motion is not None}
         for name, value in given.items():
             checks.number(name, value, error=TangentialContactError)
-        if self.grid.line and (forces[2] != 0.0 or motions[2]):
+        if (self.grid.line or self.half_space.periodic) and (forces[2] != 0.0 or motions[2]):
             raise TangentialContactError(
-                "a line contact carries no Mz and has no twist: give Qx and Qy only, or shifts"
+                "line and periodic contacts carry no Mz and have no twist: give Qx and Qy only, or "
+                "shifts"
             )
+
+
+def planar_modes(half_space: HalfSpace) -> PlanarModes:
+    """Return the rigid motions in the plane of a contact; a periodic one does not turn."""
+    modes = PlanarModes.on(half_space.grid)
+    return modes.only(modes.free[:2]) if half_space.periodic else modes
 
 
 def listed(places: Sequence[int], forces: Array) -> str:

@@ -283,10 +283,12 @@ class BoxOperator:
 
     def _inverse(self, level: int) -> SpectralFilter:
         half_space, shape = self._half_space, self._half_space.grid.shape
-        period = fast_lengths(*shape)
+        period = shape if half_space.periodic else fast_lengths(*shape)
         symbols = [[half_space.symbol(i, j, period) for j in SHEAR] for i in SHEAR]
         local = (LEVEL_RATIO**level - 1.0) * self.self_compliance
         for k, row in enumerate(symbols):
             row[k] = row[k] + local
+            if half_space.periodic:
+                row[k][0, 0] = row[k].max()  # The forces decide the mean shear.
         transform = half_space.transform(shape, period, 2)
         return spectral_filter(transform, inverse_symbols(symbols), SHEAR, SHEAR)

@@ -128,3 +128,28 @@ def test_convolutions_hardly_grow_with_the_grid(record: dict[str, float]) -> Non
         counts.append(state.convolutions)
         record[f"Hertz, {cells}², residual 1e-8: convolutions"] = state.convolutions
     assert max(counts) <= 1.5 * counts[0]
+
+
+def test_a_periodic_rough_patch_has_the_contact_of_tamaas() -> None:
+    """Both have the same discrete problem: cells in contact are equal, pressures to 1e-6."""
+    tm = pytest.importorskip("tamaas", reason="pip install tamaas")
+    cells, mean = 128, 0.02 * PAIR.contact_modulus
+    along = np.fft.fftfreq(cells, 1 / cells)[:, None], np.fft.rfftfreq(cells, 1 / cells)
+    wave_number = np.hypot(*along)
+    size = np.where((wave_number >= 2) & (wave_number <= 32), np.maximum(wave_number, 1) ** -1.8, 0)
+    phase = np.exp(2j * np.pi * np.random.default_rng(1).random(wave_number.shape))
+    height = np.fft.irfft2(size * phase, s=(cells, cells))
+    grid = Grid.covering((1.0, 1.0), (cells, cells))
+    height *= 0.2 / np.hypot(*np.gradient(height, *grid.pitch)).std()
+    ours = NormalContact(HalfSpace(grid, PAIR, periodic=True)).solve(height, mean, tolerance=1e-9)
+    tm.initialize(1)
+    tm.set_log_level(tm.LogLevel.error)
+    model = tm.ModelFactory.createModel(tm.model_type.basic_2d, list(grid.size), list(grid.shape))
+    model.E, model.nu = PAIR.contact_modulus, 0.0
+    solver = tm.PolonskyKeerRey(model, -height, 1e-13)
+    solver.max_iter = 5000
+    solver.solve(mean)
+    theirs = np.array(model.traction)
+    assert 0.05 < (theirs > 0.0).mean() < 0.9
+    assert np.count_nonzero((theirs > 0.0) != (ours.pressure > 0.0)) <= 1
+    np.testing.assert_allclose(ours.pressure, theirs, atol=1e-6 * theirs.max())

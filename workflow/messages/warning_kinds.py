@@ -78,8 +78,10 @@ class WarningKind(MessageKind):
         "FS-W008",
         "The grid does not suit the contact",
         "By Hertz's formulas the unworn contact is larger than the grid, or covers hardly any of "
-        "its cells. Pressures would be cut off or meaningless.",
-        "Change the size of the grid or its number of cells.",
+        "its cells: pressures would be cut off or meaningless. Or a grid that repeats itself has a "
+        "step between opposite borders, on which the contact presses.",
+        "Change the size of the grid or its number of cells; give heights whose borders fade into "
+        "each other.",
     )
     LOST_ROUGHNESS = (
         "FS-W009",

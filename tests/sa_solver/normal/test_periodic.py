@@ -103,7 +103,14 @@ def test_what_a_periodic_contact_cannot_do_is_refused() -> None:
             contact.solve(height, P=1.0, **entry)
     with pytest.raises(InputError, match="is full at an approach"):
         contact.solve(height, approach=1.001 * float(height.mean()) + 1e-6)
-    steel = Material(young=210e3, poisson=0.3)
+    steel, rubber = Material(young=210e3, poisson=0.3), Material(young=10.0, poisson=0.5)
     sheared = FrictionalContact(HalfSpace(grid, ElasticPair(steel, steel), periodic=True), 0.5)
-    with pytest.raises(InputError, match="no shear"):
-        sheared.advance(sheared.unloaded_state(height), height, ContactLoad(P=1.0, Qx=0.1))
+    unloaded = sheared.unloaded_state(height)
+    for load, why in (
+        (ContactLoad(P=1.0, Mz=0.1), "turn"),
+        (ContactLoad(P=1.0, strain=1e-3), "strain"),
+    ):
+        with pytest.raises(InputError, match=why):
+            sheared.advance(unloaded, height, load)
+    with pytest.raises(InputError, match="similar"):
+        HalfSpace(grid, ElasticPair(steel, rubber), periodic=True)

@@ -22,6 +22,7 @@ RIGID_2 = "  body_2: {young: 115 GPa, poisson: 0.29}", "  body_2: rigid"
 
 SPHERE = "shape: sphere, radius: 10 mm"
 NO_FRICTION = "friction: {coefficient: 0.7}\n", ""
+PERIODIC = BALL.replace("size: [1 mm, 1 mm]", "size: [1 mm, 1 mm], boundary: periodic")
 # Base, text to replace, its replacement, key in the message.
 WRONG = [
     (BALL, "shape: sphere, ", "", "structure.shape"),
@@ -42,6 +43,11 @@ WRONG = [
     (BALL, SPHERE, "shape: heights, file: none.npy", "structure.file"),
     (BALL, *NO_FRICTION, "friction"),
     (BALL.replace(*RIGID_2).replace("Qx: 210 N", "Mx: 1 N*mm"), *NO_FRICTION, "friction"),
+    (PERIODIC, "boundary: periodic", "boundary: closed", "contact.boundary"),
+    (PERIODIC, "Qx: 210 N", "Mz: 1 N*mm", "load_path"),
+    (PERIODIC, "Qx: 210 N", "bulk_stress_1: 1 MPa", "load_path"),
+    (PERIODIC, *RIGID_2, "materials"),
+    (ROLLER, "size: 2 mm", "size: 2 mm, datum: 9 mm, boundary: periodic", "contact.datum"),
 ]
 
 

@@ -240,3 +240,41 @@ assert not {{"gmsh", "skfem", "meshio"}} & set(sys.modules)
 
 
 # --- shipped cases ------------------------------------------------------------------------------
+
+
+def test_a_periodic_patch_has_no_border(tmp_path):
+    """Heights moved by a part of the grid give the same results, and no warning of a border."""
+    turns = 2.0 * np.pi * np.arange(24) / 24
+    heights = 1e-3 * (np.cos(2.0 * turns)[:, None] + np.cos(3.0 * turns) + np.cos(turns))
+    last = []
+    for name, surface in (("own", heights), ("moved", np.roll(heights, (5, 9), (0, 1)))):
+        np.save(tmp_path / f"{name}.npy", surface)
+        (tmp_path / f"{name}.yaml").write_text(
+            SMALL.replace("shape: sphere, radius: 10 mm", f"shape: heights, file: {name}.npy")
+            .replace("[32, 32]", "[24, 24]")
+            .replace("history: full", "boundary: periodic"),
+            encoding="utf-8",
+        )
+        folder = tmp_path / name
+        result = invoke("run", tmp_path / f"{name}.yaml", "--out", folder)
+        assert result.exit_code == 0
+        assert WarningKind.CONTACT_AT_BORDER not in kinds_in([result.output])
+        last.append(summary_of(folder)["states"][-1])
+    own, moved = last
+    assert own["Qx"] == pytest.approx(210.0, rel=1e-7)
+    for quantity in ("peak_pressure", "approach", "shift_x", "contact_radius"):
+        assert own[quantity] == pytest.approx(moved[quantity], rel=1e-5)
+
+
+def test_a_step_between_the_borders_of_a_periodic_patch_warns(tmp_path):
+    np.save(tmp_path / "ramp.npy", np.tile(np.linspace(0.0, 1e-3, 24)[:, None], (1, 24)))
+    case = tmp_path / "ramp.yaml"
+    case.write_text(
+        SMALL.replace("shape: sphere, radius: 10 mm", "shape: heights, file: ramp.npy")
+        .replace("[32, 32]", "[24, 24]")
+        .replace("history: full", "boundary: periodic"),
+        encoding="utf-8",
+    )
+    assert WarningKind.UNSUITABLE_GRID in kinds_in([invoke("check", case).output])
+    free = invoke("check", case, "--set", "contact.boundary=free")
+    assert WarningKind.UNSUITABLE_GRID not in kinds_in([free.output])

@@ -11,7 +11,7 @@ def half_space_of(case: BodiesCase, grid: Grid) -> HalfSpace:
     """Return both bodies as half-spaces, or half-planes, on ``grid``."""
     pair = ElasticPair(*bodies_of(case))
     datum = case.contact.datum if isinstance(case, LineContactCase) else None
-    return HalfSpace(grid, pair, datum=datum)
+    return HalfSpace(grid, pair, datum=datum, periodic=case.contact.periodic)
 
 
 def bodies_of(case: BodiesCase) -> tuple[Material, Material]:

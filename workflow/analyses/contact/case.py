@@ -18,7 +18,12 @@ from sa_solver.surfaces import shapes
 from sa_solver.types import Array, ElasticPair, Grid
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.load_path import ContactPath, LegsOrFile, LineContactPath
-from workflow.analyses.contact.plausibility import about_grid, about_pressure, about_shear
+from workflow.analyses.contact.plausibility import (
+    about_grid,
+    about_pressure,
+    about_repetition,
+    about_shear,
+)
 from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.case.fields import File, Quantity
 from workflow.case.files.input_files import read_heights
@@ -52,6 +57,8 @@ Poisson = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]
 RIGID = ElasticMaterial(young=np.inf, poisson=0.0)
 AREA_SHAPES = ("sphere", "ellipsoid")
 LINE_SHAPES = ("cylinder", "flat_rounded")
+# Loads that turn the bodies or strain them all over.
+UNLIKE = ("Mx", "My", "Mz", "tilt_x", "tilt_y", "twist", "bulk_stress_1", "bulk_stress_2")
 # Shapes of contacts both over an area and along a line.
 PLANE, HEIGHTS = "plane", "heights"
 
@@ -234,6 +241,12 @@ class HalfSpaceGrid(Section):
 
     grid: object  # each dimension narrows the cells and the size
     size: object
+    boundary: Literal["free", "periodic"] = entry(
+        "free: the bodies go on beyond the grid without contact; periodic: the grid repeats itself "
+        "without end, as a patch of a rough surface",
+        "free",
+        default="free",
+    )
     tolerance: Tolerance = entry("relative tolerance of every residual [1]", 1e-8, default=1e-8)
     history: Literal["auto", "full", "reversals"] = entry(
         "auto: the cheapest that is accurate; full: all increments; reversals: only turning points",
@@ -246,6 +259,11 @@ class HalfSpaceGrid(Section):
         "2 %",
         default=0.02,
     )
+
+    @property
+    def periodic(self) -> bool:
+        """True if the grid repeats itself."""
+        return self.boundary == "periodic"
 
     @abstractmethod
     def centred(self) -> Grid:
@@ -286,6 +304,11 @@ class LineContactGrid(HalfSpaceGrid):
                 f"{self.datum:g} mm: too close; allowed: at least the size, {self.size:g} mm",
                 *("datum", "size"),
             )
+        if self.datum is not None and self.periodic:
+            raise disagreement(
+                "displacements of a periodic contact are relative to their mean; allowed: no datum",
+                *("datum", "boundary"),
+            )
         return self
 
     def centred(self) -> Grid:
@@ -313,9 +336,8 @@ class BodiesCase(Case):
         """Refuse shear, and pressure on dissimilar bodies, if no friction is given."""
         if "friction" in self.model_fields_set:
             return self
-        pair = ElasticPair(elastic(self.materials.body_1), elastic(self.materials.body_2))
         sheared = sorted(set(self.load_path.table().columns) - set(PRESSING))
-        if sheared or not pair.similar:
+        if sheared or not self._pair.similar:
             why = f"load_path has {', '.join(sheared)}" if sheared else "dissimilar bodies rub"
             raise disagreement(f"missing, but {why}; allowed: a coefficient, or 0", "friction")
         return self
@@ -323,10 +345,31 @@ class BodiesCase(Case):
     @model_validator(mode="after")
     def _can_run(self) -> Self:
         check_bulk_stress(self.load_path.table(), self.materials)
+        if self.contact.periodic:
+            self._check_periodic()
         if isinstance(self.structure, Heights):
             require_shape(self.structure.file, self.contact.centred().shape)
         check_surfaces(self.structure, self.contact.centred())
         return self
+
+    def _check_periodic(self) -> None:
+        """Refuse loads and bodies that a patch and its neighbours cannot have alike."""
+        if unlike := sorted(set(self.load_path.table().columns) & set(UNLIKE)):
+            raise disagreement(
+                f"{', '.join(unlike)}: all patches of a periodic contact are alike and do not "
+                "turn; allowed: with contact.boundary: free",
+                "load_path",
+            )
+        if not self._pair.similar:
+            raise disagreement(
+                "a periodic contact of dissimilar bodies is not computed; allowed: bodies of equal "
+                "(1 - 2ν)/G, or contact.boundary: free",
+                "materials",
+            )
+
+    @property
+    def _pair(self) -> ElasticPair:
+        return ElasticPair(elastic(self.materials.body_1), elastic(self.materials.body_2))
 
     @property
     def question(self) -> str:
@@ -343,6 +386,7 @@ class BodiesCase(Case):
         if grid.line:
             kind, cells = "line contact", f"{nx} cells of {plain(dx, 'mm', 4)}"
         count = f"{len(table)} increment{'s' if len(table) > 1 else ''}"
+        repeated = ", repeated without end" if self.contact.periodic else ""
         return [
             ("structure", f"{self.structure.text}, {kind}"),
             ("load path", f"{count} of {', '.join(table.columns)}"),
@@ -350,7 +394,7 @@ class BodiesCase(Case):
             *surfaces_in_words(self.structure, grid),
             *of_bodies("material", self.materials),
             ("friction", f"{self.friction.coefficient:g}" if self.friction.coefficient else "none"),
-            ("contact", f"{cells}, history {self.contact.history}"),
+            ("contact", f"{cells}{repeated}, history {self.contact.history}"),
         ]
 
     def plausibility_warnings(self) -> Iterator[Notice]:
@@ -369,6 +413,8 @@ class BodiesCase(Case):
                 yield from about_pressure("load_path", found[1], bodies)
                 yield from about_grid(found[0], sides, grid.shape)
         yield from surface_warnings(self.structure, grid)
+        if self.contact.periodic:
+            yield from about_repetition(self.structure.gap_on(grid))
         unit = "N/mm" if grid.line else "N"
         yield from about_shear("load_path", table, self.friction.coefficient, unit)
 

@@ -17,6 +17,9 @@ from workflow.models.uncoupled.load_table import LoadTable
 HARDLY = 1e-3
 # Least number of cells across a contact with which the grid resolves it at all.
 FEWEST = 2.0
+# Step at the border of repeated heights over that between most neighbouring rows of cells. Rows of
+# rough surfaces differ among each other by less than twice.
+STEP = 4.0
 # Rounding of forces that are meant to reach the limit of friction.
 ROUNDING = 1e-9
 
@@ -46,6 +49,24 @@ def about_grid(width: float, sides: Sequence[float], cells: Sequence[int]) -> It
             f"contact.size: cells of {plain(pitch, 'mm', 3)} are too large ({shown}): take a "
             "smaller size, or more cells in contact.grid",
         )
+
+
+def about_repetition(height: Array) -> Iterator[Notice]:
+    """Warn where a repeated ``height`` ``(nx, ny)`` [mm] has a step between its borders."""
+    for axis, along in enumerate(("x", "y")):
+        if height.shape[axis] == 1:
+            continue
+        across = np.diff(np.append(height, height.take([0], axis), axis), axis=axis)
+        sizes = np.sqrt(np.nanmean(np.where(np.isfinite(across), across, np.nan) ** 2, 1 - axis))
+        if sizes[-1] > STEP * np.median(sizes[:-1]):
+            step, usual = (plain(size, "mm", 2) for size in (sizes[-1], float(np.median(sizes))))
+            yield Notice(
+                WarningKind.UNSUITABLE_GRID,
+                f"contact.boundary: along {along} the repeated heights have a step of {step} "
+                f"between opposite borders, and neighbouring cells differ by {usual} (root mean "
+                "squares): the contact presses on a step that the surface does not have; take "
+                "heights that fade into each other, or free",
+            )
 
 
 def about_shear(path: str, table: LoadTable, friction: float, unit: str) -> Iterator[Notice]:
