@@ -58,14 +58,14 @@ def about_repetition(height: Array) -> Iterator[Notice]:
             continue
         across = np.diff(np.append(height, height.take([0], axis), axis), axis=axis)
         sizes = np.sqrt(np.nanmean(np.where(np.isfinite(across), across, np.nan) ** 2, 1 - axis))
-        if sizes[-1] > STEP * np.median(sizes[:-1]):
-            step, usual = (plain(size, "mm", 2) for size in (sizes[-1], float(np.median(sizes))))
+        step, usual = float(sizes[-1]), float(np.median(sizes[:-1]))
+        if step > STEP * usual:
             yield Notice(
                 WarningKind.UNSUITABLE_GRID,
-                f"contact.boundary: along {along} the repeated heights have a step of {step} "
-                f"between opposite borders, and neighbouring cells differ by {usual} (root mean "
-                "squares): the contact presses on a step that the surface does not have; take "
-                "heights that fade into each other, or free",
+                f"contact.boundary: along {along} the repeated heights have a step of "
+                f"{plain(step, 'mm', 2)} between opposite borders, and neighbouring cells differ "
+                f"by {plain(usual, 'mm', 2)} (root mean squares): the contact presses on a step "
+                "that the surface does not have; take heights that fade into each other, or free",
             )
 
 
