@@ -27,7 +27,8 @@ from fe_models.solvers.pardiso import in_parallel
 from fe_models.solvers.symmetry import Mirror
 from fe_models.supported_body import SupportedBody
 from sa_solver.cycles.increments import dissipated, in_rows, mean_of_ends
-from sa_solver.types import Array, Indices, LoadHistory, Progress, Tally, resultants, unseen
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, Indices, Progress, Tally, resultants, unseen
 
 T = TypeVar("T")
 

@@ -60,9 +60,10 @@ if TYPE_CHECKING:
     from sa_solver.half_space.operator import HalfSpace
     from sa_solver.half_space.stress import principal_stresses, von_mises
     from sa_solver.half_space.subsurface import SubsurfaceStress
+    from sa_solver.load_history import LoadHistory
     from sa_solver.normal.contact import NormalContact
     from sa_solver.tangential.contact import TangentialContact
-    from sa_solver.types import ElasticPair, Frame, Grid, LoadHistory, Material
+    from sa_solver.types import ElasticPair, Frame, Grid, Material
 
 __all__ = [
     "ContactLoad",

@@ -22,7 +22,8 @@ from fe_models.elasticity.stress import StressField
 from fe_models.interface_frames import ALONG_AXIS
 from fe_models.meshes.structure_mesh import Body, Face, Interface
 from fe_models.structure import InterfaceHistory
-from sa_solver.types import Array, Frame, Indices, LoadHistory, Mask
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, Frame, Indices, Mask
 
 # Distance, as a share of the largest coordinate, up to which a vertex counts as on a plane: mesh
 # files store six digits.

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.contact.contacts import Contacts
 from wear.contact.face_loads import CycleLoads
 from wear.contact.interface import InterfaceContact

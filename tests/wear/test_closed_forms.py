@@ -29,8 +29,9 @@ import pytest
 import scipy.linalg
 
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.normal.contact import NormalContact
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.types import Array, ElasticPair, Grid, Material
 from tests.marks import slow
 from tests.oracles.worn_shapes import worn_cylinder, worn_sphere
 from wear.contact.moving import LARGE_STROKE, passages

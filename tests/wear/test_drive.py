@@ -8,7 +8,8 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid, Material
 from tests.wear.contact import contacts
 from tests.wear.contact.contacts import BODY, FRICTION, PAIR, STEEL
 from wear.contact.drive import Drive

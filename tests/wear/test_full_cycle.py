@@ -9,7 +9,8 @@ import pytest
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.contact.drive import Drive
 from wear.steps.full_cycle import CLOSED, CycleStart, march_cycle, starts_near
 from wear.steps.stepping import ContactFailure

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sa_solver.errors import InputError
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.contact.face_loads import CycleLoads
 from wear.contact.interface import InterfaceContact
 from wear.contact.settings import InterfaceSettings

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.normal.contact import NormalContact
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.types import Array, ElasticPair, Grid, Material
 from tests.marks import slow
 from wear.contact.drive import Drive
 from wear.laws import EnergyLaw

@@ -8,7 +8,8 @@ import numpy as np
 import workflow.analyses.wear.structures.resultants
 from fe_models.meshes.structure_mesh import Interface
 from fe_models.structure import InterfaceHistory
-from sa_solver.types import Frame, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Frame
 from workflow.analyses.wear.structures.resultants.faces import facets_over
 
 FRICTION, SIZE = 0.4, (10.0, 60.0)

@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 
 from fe_models.meshes.structure_mesh import Face
-from sa_solver.types import Array, Frame, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, Frame
 from tests.workflow.command_line import invoke
 from workflow import kinds
 from workflow.analyses import wear

@@ -14,8 +14,9 @@ import numpy as np
 
 from sa_solver.contact_state import ContactLoad
 from sa_solver.cycles.history import ContactLoadPath
+from sa_solver.load_history import LoadHistory
 from sa_solver.rigid_modes import NORMAL
-from sa_solver.types import Array, Grid, LoadHistory, Tilt
+from sa_solver.types import Array, Grid, Tilt
 
 FORCES = (False,) * 6
 TILTS = NORMAL[1:]

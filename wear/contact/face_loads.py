@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from sa_solver import checks
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 
 
 class FaceLoads(Protocol):

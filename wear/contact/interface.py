@@ -19,9 +19,10 @@ from sa_solver.contact_state import ContactState
 from sa_solver.cycles.increments import slip_of_states
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.normal.contact import NormalContact
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, LoadHistory, Mask
+from sa_solver.types import Array, Mask
 from wear.contact.face_loads import FaceLoads
 from wear.contact.link import StructureLink, linked
 from wear.contact.moving import followed, passages

@@ -27,8 +27,9 @@ import numpy as np
 from numpy.polynomial.legendre import legder, legvander
 
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, LoadHistory, Mask
+from sa_solver.types import Array, Mask
 from wear.contact.transfer import Transfer
 
 MARGIN = 0.5

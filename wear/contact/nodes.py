@@ -14,7 +14,8 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
 from wear.laws import SlidingConditions, WearLaw
 from wear.steps.stepping import Starts

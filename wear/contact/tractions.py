@@ -14,7 +14,8 @@ from sa_solver.cycles.increments import (
     friction_work,
     slip_of_states,
 )
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 
 
 def acting_slip(slip: Array, loads: LoadHistory) -> Array:

@@ -33,7 +33,8 @@ import numpy as np
 
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.half_space.subsurface_influence import XX, XY, YY, YZ, ZX
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.contact.link import StructureLink, fitted_like, linked
 from wear.contact.transfer import Transfer
 

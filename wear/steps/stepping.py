@@ -33,10 +33,11 @@ import numpy as np
 
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.half_space.influence import Z
+from sa_solver.load_history import LoadHistory
 from sa_solver.normal.contact import NormalContact, NormalStart, NormalState
 from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import SAME, first_largest
-from sa_solver.types import Array, Grid, LoadHistory
+from sa_solver.types import Array, Grid
 from wear.contact.drive import Drive
 from wear.contact.moving import Passage, TravelError
 from wear.laws import SlidingConditions, WearLaw

@@ -14,9 +14,10 @@ from fe_models.meshes.transfer import FaceTransfer
 from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.normal.contact import NormalContact
 from sa_solver.surfaces.resolution import fewest_across, is_point, peak_error, too_few_across
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
 from wear.contact.link import StructureLink

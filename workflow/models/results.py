@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 from wear.contact.contacts import KINETICS
 from wear.contact.face_loads import FaceLoads
 from wear.contact.tractions import ContactFields

@@ -26,7 +26,8 @@ from fe_models.meshes.remesh import worn_mesh
 from fe_models.meshes.structure_mesh import MeshError, StructureMesh
 from fe_models.motion import deformation
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 from workflow.errors import MethodFailed
 from workflow.models.loads import BODIES, ContactFace, UserFace
 from workflow.models.progress import ReportsProgress

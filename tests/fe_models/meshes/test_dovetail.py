@@ -9,7 +9,7 @@ from fe_models.joints import friction
 from fe_models.joints.friction import FrictionalJoint
 from fe_models.meshes.remesh import element_volumes
 from fe_models.structure import load_history
-from sa_solver.types import LoadHistory
+from sa_solver.load_history import LoadHistory
 from tests.marks import slow
 
 DEGREES = np.pi / 180.0

@@ -11,8 +11,9 @@ from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
 from sa_solver.cycles.history import ContactLoadPath, march_history
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.reference.mindlin import ShearedSphere
-from sa_solver.types import ElasticPair, Grid, LoadHistory
+from sa_solver.types import ElasticPair, Grid
 from tests.limits.scenes import ALIKE, BOTH, FRICTION, RADIUS, SOLVED, P, sphere
 from tests.marks import slow
 from wear.steps.full_cycle import march_cycle

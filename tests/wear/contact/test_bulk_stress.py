@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.contact.transfer import CellNodes
 from wear.cracking.bulk_stress import RIGID, SIDE, BodyFace
 

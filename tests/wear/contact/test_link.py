@@ -9,7 +9,8 @@ from scipy.spatial import Delaunay
 from fe_models.meshes.structure_mesh import Face
 from fe_models.meshes.transfer import FaceTransfer
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.types import Array, ElasticPair, Frame, Grid, LoadHistory, Material
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, ElasticPair, Frame, Grid, Material
 from tests.oracles.elastic_layer import layer_compliance, press
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads

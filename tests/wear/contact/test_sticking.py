@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 from wear.contact.sticking import with_sticking_shear
 from wear.contact.tractions import CycleTractions
 

@@ -8,8 +8,9 @@ import pytest
 
 from sa_solver.cycles.partial_slip import partial_slip_curve
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.normal.contact import NormalContact
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
+from sa_solver.types import Array, ElasticPair, Grid, Tilt
 from tests.marks import slow
 from tests.oracles.sliding_cylinder import wear_without_tilt
 from tests.wear.contact import contacts

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sa_solver.types import LoadHistory
+from sa_solver.load_history import LoadHistory
 from tests.workflow.command_line import command
 from tests.workflow.conftest import Run
 from workflow.analyses.wear.model import loads_of

@@ -22,8 +22,9 @@ from sa_solver.contact import FrictionalContact
 from sa_solver.cycles.partial_slip import PartialSlip, PartialSlipError, partial_slip_curve
 from sa_solver.cycles.tangential_loop import LoopFailure, LoopPath, TangentialLoop, march_loop
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.normal.contact import NormalContact
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid
 from wear.contact.contacts import LastSolved
 from wear.contact.drive import Drive
 from wear.joints.jenkins import Jenkins

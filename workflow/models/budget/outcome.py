@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
 from wear.contact.tractions import CycleTractions, increments_change, increments_error

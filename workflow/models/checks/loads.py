@@ -9,7 +9,8 @@ import numpy as np
 
 from sa_solver import checks
 from sa_solver.errors import InputError
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
 
 if TYPE_CHECKING:

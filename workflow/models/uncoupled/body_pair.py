@@ -11,9 +11,10 @@ import numpy as np
 from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.normal.contact import NormalContact
 from sa_solver.ties import SAME, first_largest
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
+from sa_solver.types import Array, ElasticPair, Grid, Tilt
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads
 from workflow.models.checks.names import check_face_name

@@ -10,8 +10,9 @@ import numpy as np
 
 from sa_solver import checks
 from sa_solver.errors import InputError
+from sa_solver.load_history import LoadHistory
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import Array
 from wear.contact.face_loads import CycleLoads
 from workflow.models.checks.loads import check_history, check_slip
 from workflow.models.loads import ContactFace, UncoupledSource, UserFace

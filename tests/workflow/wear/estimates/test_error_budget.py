@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from fe_models.meshes.structure_mesh import MeshError
-from sa_solver.types import LoadHistory, Material
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Material
 from tests.workflow.command_line import invoke
 from tests.workflow.mesh_scenes import settings
 from wear.coupled_state import Observer

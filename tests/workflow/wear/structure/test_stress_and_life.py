@@ -10,7 +10,8 @@ import pytest
 
 from sa_solver import von_mises
 from sa_solver.half_space.subsurface import SubsurfaceStress
-from sa_solver.types import Array, Grid, LoadHistory, Material
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, Grid, Material
 from tests.marks import slow
 from tests.workflow.conftest import contents_of
 from tests.workflow.output.shown_files import check_arrays, check_scene

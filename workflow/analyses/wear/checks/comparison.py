@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver.contact_state import ContactState
-from sa_solver.types import LoadHistory
+from sa_solver.load_history import LoadHistory
 from workflow.analyses.contact.output.layout import load_columns
 from workflow.shell.output.results import ResultsWriter
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import Face, Interface
 from fe_models.structure import CLOSED, InterfaceHistory
-from sa_solver.types import ElasticPair, LoadHistory, Mask
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import ElasticPair, Mask
 from wear.contact.interface import FirstContact
 from wear.coupled_state import CoupledState
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase

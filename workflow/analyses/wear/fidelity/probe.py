@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from sa_solver.half_space.operator import HalfSpace
+from sa_solver.load_history import LoadHistory
 from sa_solver.normal.contact import NormalContact
-from sa_solver.types import ElasticPair, Grid, LoadHistory, resultant_change
+from sa_solver.types import ElasticPair, Grid, resultant_change
 from wear.contact.tractions import acting_slip
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.marching import advance_cycles

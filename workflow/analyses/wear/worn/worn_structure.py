@@ -17,7 +17,8 @@ from fe_models.meshes.quality import element_sizes, elements_across, radius_rati
 from fe_models.meshes.remesh import oriented_elements, worn_volume
 from fe_models.meshes.structure_mesh import Body, Interface, StructureMesh, write_msh
 from sa_solver.half_space.stress import von_mises
-from sa_solver.types import LoadHistory, Tally
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Tally
 from wear.coupled_state import CoupledState
 from workflow.analyses.wear.budget.report import arrays_of, summary_of
 from workflow.analyses.wear.output.datasets import put_face

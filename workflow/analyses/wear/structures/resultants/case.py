@@ -9,7 +9,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import model_validator
 
-from sa_solver.types import Frame, Grid, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Frame, Grid
 from workflow.analyses.contact.case import BodyMaterial
 from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.analyses.wear.case.base import WearCase, check_interface_name

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from sa_solver.load_history import LoadHistory
 from sa_solver.tangential.gross_slip import GROSS_SHARE
-from sa_solver.types import Array, LoadHistory, Mask
+from sa_solver.types import Array, Mask
 from workflow.analyses.wear.case.sections import SHARES_DIFFERENCE
 from workflow.analyses.wear.structures.resultants.imported import COLUMNS
 from workflow.case.files.input_files import InputFileError

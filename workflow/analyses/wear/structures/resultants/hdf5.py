@@ -10,7 +10,8 @@ import h5py
 import numpy as np
 
 from sa_solver.errors import InputError
-from sa_solver.types import Array, Frame, Indices, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, Frame, Indices
 from workflow.analyses.wear.structures.resultants.consistency import (
     MIX,
     Bounds,

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.meshes.structure_mesh import Face
-from sa_solver.types import Array, Frame, Indices, LoadHistory, Tilt
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array, Frame, Indices, Tilt
 from workflow.analyses.contact.output.layout import LOADS
 from workflow.layout.declared import declared
 

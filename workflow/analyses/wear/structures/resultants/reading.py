@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 from workflow.analyses.wear.structures.resultants.consistency import (
     MIX,
     Bounds,

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from fe_models.meshes.structure_mesh import Interface
 from fe_models.structure import CycleSolution, InterfaceHistory
-from sa_solver.types import Array, LoadHistory
+from sa_solver.load_history import LoadHistory
+from sa_solver.types import Array
 from workflow.analyses.contact.output.layout import LOAD_HISTORY, load_columns
 from workflow.analyses.wear.output.datasets import mesh_of
 from workflow.analyses.wear.output.layout import FACE
