@@ -1,7 +1,8 @@
 """Contact mechanics on elastic half-spaces, and the types, frames and signs shared by all packages.
 
 Input
-    - ``Material``: an isotropic elastic material.
+    - ``Material``: an isotropic elastic material, with the layers on its surface.
+    - ``Layer``: a layer, such as a coating.
     - ``ElasticPair``: the elastic constants of two bodies in contact.
     - ``Grid``: a uniform grid of cells over a contact, or over the width of a line contact.
     - ``Frame``: the origin and axes of an interface.
@@ -63,7 +64,7 @@ if TYPE_CHECKING:
     from sa_solver.load_history import LoadHistory
     from sa_solver.normal.contact import NormalContact
     from sa_solver.tangential.contact import TangentialContact
-    from sa_solver.types import ElasticPair, Frame, Grid, Material
+    from sa_solver.types import ElasticPair, Frame, Grid, Layer, Material
 
 __all__ = [
     "ContactLoad",
@@ -77,6 +78,7 @@ __all__ = [
     "Grid",
     "HalfSpace",
     "InputError",
+    "Layer",
     "LoadHistory",
     "LoopPath",
     "Material",

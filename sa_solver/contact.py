@@ -148,12 +148,16 @@ class FrictionalContact:
         return self._state(before, load, normal, replace(tangential, slip=slip), sliding)
 
     def two_normal_problems(self, before: ContactState, load: ContactLoad) -> bool:
-        """Return whether two normal problems give the shear: first loading of a line contact."""
+        """Return whether two normal problems give the shear: first loading of a line contact.
+
+        Layers do not resist shear as they resist pressure.
+        """
         along_x = load.values[1] != 0.0 and load.values[2] == 0.0
         by_force = not any(load.motion[k] for k in (0, 1, 2, 4))
         moved = load.along is not None or before.along is not None
         fresh = not before.shear.any() and load.strain == before.strain and not moved
-        return self.grid.line and self.friction > 0.0 and along_x and by_force and fresh
+        alike = self.grid.line and not self.half_space.pair.layered
+        return alike and self.friction > 0.0 and along_x and by_force and fresh
 
     def offset(self, before: ContactState, load: ContactLoad) -> Array:
         """Return the slip ``(2, nx, ny)`` [mm] of the increment but for new tractions and motions.

@@ -79,8 +79,53 @@ that they have when unloaded and unworn, whatever moments this takes."""
 
 
 @dataclass(frozen=True)
+class Layer:
+    """Elastic layer that is bonded to what lies below it, such as a coating.
+
+    Parameters
+    ----------
+    thickness
+        Thickness [mm].
+    young
+        Young's modulus [MPa].
+    poisson
+        Poisson's ratio, from 0 to 0.5.
+
+    Raises
+    ------
+    InputError
+        For a thickness or modulus that is infinite or not above 0, or a Poisson's ratio outside 0
+        to 0.5.
+
+    Examples
+    --------
+    A ball sinks deeper into steel under 50 µm of a soft coating:
+
+    >>> from sa_solver import ElasticPair, Grid, HalfSpace, Layer, Material, NormalContact
+    >>> steel, coating = Material(210e3, 0.3), Layer(thickness=0.05, young=50e3, poisson=0.3)
+    >>> coated = Material(210e3, 0.3, layers=[coating])
+    >>> grid = Grid.covering((1.0, 1.0), (50, 50))
+    >>> for body in (steel, coated):
+    ...     contact = NormalContact(HalfSpace(grid, ElasticPair(steel, body)))
+    ...     state = contact.solve((grid.x**2 + grid.y**2) / 20.0, P=50.0)
+    ...     print(f"{1e3 * state.approach:.2f} um, {state.pressure.max():.0f} MPa")
+    2.19 um, 1084 MPa
+    2.48 um, 875 MPa
+    """
+
+    thickness: float
+    young: float
+    poisson: float
+
+    def __post_init__(self) -> None:
+        checks.number("thickness of a layer [mm]", self.thickness, above=0.0)
+        checks.number("Young's modulus of a layer [MPa]", self.young, above=0.0)
+        checks.number("Poisson's ratio of a layer", self.poisson, least=0.0, most=0.5)
+
+
+@dataclass(frozen=True)
 class Material:
-    """Isotropic linear elastic material.
+    """Isotropic linear elastic material of a body, with the layers on its surface.
 
     Parameters
     ----------
@@ -95,12 +140,15 @@ class Material:
         Yield stress [MPa].
     expansion
         Coefficient of linear thermal expansion [1/K].
+    layers
+        Layers on the surface of the body, the outermost first. The other properties are those of
+        the body below them.
 
     Raises
     ------
     InputError
-        For a modulus or yield stress that is not above 0, a Poisson's ratio outside 0 to 0.5, or a
-        density below 0.
+        For a modulus or yield stress that is not above 0, a Poisson's ratio outside 0 to 0.5, a
+        density below 0, or layers that are not of :class:`Layer`.
 
     Examples
     --------
@@ -117,6 +165,7 @@ class Material:
     density: float = 0.0
     yield_stress: float = np.inf
     expansion: float = 0.0
+    layers: tuple[Layer, ...] = ()
 
     def __post_init__(self) -> None:
         checks.number("Young's modulus [MPa]", self.young, above=0.0, infinite=True)
@@ -124,6 +173,12 @@ class Material:
         checks.number("density [t/mm³]", self.density, least=0.0)
         checks.number("yield stress [MPa]", self.yield_stress, above=0.0, infinite=True)
         checks.number("thermal expansion [1/K]", self.expansion)
+        given: Any = self.layers
+        if not isinstance(given, list | tuple) or not all(isinstance(n, Layer) for n in given):
+            raise InputError(
+                f"Material.layers is {checks.shown(given)}: give a list of Layer, outermost first"
+            )
+        checks.settle(self, layers=tuple(given))
 
     @property
     def shear_modulus(self) -> float:
@@ -144,6 +199,9 @@ class ElasticPair:
     their surfaces depends on four compliances [1/MPa]: ``normal`` Σ (1-ν)/G, ``shear`` Σ 1/G,
     ``poisson`` Σ ν/G and ``coupling`` ½ [(1-2ν2)/G2 - (1-2ν1)/G1], which is exactly 0 for identical
     materials. A body with an infinite Young's modulus is rigid; two rigid bodies raise InputError.
+
+    Where a body has layers, these are the constants of the bodies below them, which decide far from
+    the contact. The layers add :mod:`sa_solver.half_space.layers`.
 
     Examples
     --------
@@ -216,9 +274,32 @@ class ElasticPair:
         return self.coupling / self.normal
 
     @property
+    def layered(self) -> bool:
+        """True if one of the bodies has layers."""
+        return any(body.layers for body in self.bodies)
+
+    @property
+    def surface(self) -> ElasticPair:
+        """Pair of the materials at the surface: the outermost layer, or the body itself."""
+        return ElasticPair(*(_at_surface(body) for body in self.bodies))
+
+    @property
     def similar(self) -> bool:
-        """True if pressure and shear do not influence each other."""
+        """True if pressure and shear do not influence each other.
+
+        Layered bodies are similar if they are the same.
+        """
+        if self.layered:
+            first, second = ((m.young, m.poisson, m.layers) for m in self.bodies)
+            return first == second
         return abs(self.dundurs_beta) <= ALIKE
+
+
+def _at_surface(body: Material) -> Material:
+    """Return the material at the surface of a ``body``."""
+    if not body.layers:
+        return body
+    return Material(body.layers[0].young, body.layers[0].poisson)
 
 
 @dataclass(frozen=True)

@@ -444,7 +444,8 @@ def _reversals(
     march = _Marches(
         contact, height, legs, lambda leg, state, share: progress(rows[leg], state, share)
     )
-    keeps_direction = contact.grid.line or contact.half_space.pair.poisson == 0.0
+    pair = contact.half_space.pair
+    keeps_direction = not pair.layered and (contact.grid.line or pair.poisson == 0.0)
     exact = keeps_direction and _proportional(path.shear)
     reason = "similar bodies, pressure constant while the shear load turns"
     parts = 1 if exact or len(rows) == 1 else PARTS_OF_LEGS

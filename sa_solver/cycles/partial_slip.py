@@ -197,6 +197,10 @@ def partial_slip_curve(
         raise PartialSlipError(
             "the pressure of dissimilar bodies depends on the shear: use march_loop instead"
         )
+    if contact.half_space.pair.layered:
+        raise PartialSlipError(
+            "layers do not resist shear as they resist pressure: use march_loop instead"
+        )
     P = checks.number("load P [N]", P, above=0.0, error=PartialSlipError)
     if checks.whole("stages", stages) < FEWEST_STAGES:
         raise PartialSlipError(f"{stages} stages: give {FEWEST_STAGES} or more")

@@ -77,6 +77,7 @@ class CoupledSplitting:
 
 def _shift_shares(half_space: HalfSpace, friction: float) -> Array:
     """Return ρ of qx, qy and p over the geometric mean of K's extreme eigenvalues ``(3,)``."""
-    beta = abs(half_space.pair.dundurs_beta)
+    pair = half_space.pair
+    beta = max(abs(pair.dundurs_beta), abs(pair.surface.dundurs_beta))
     weight = max(1.0, min(LARGEST_WEIGHT, beta / max(friction, np.finfo(float).tiny)))
     return SHIFT * np.array([weight, weight, 1.0])

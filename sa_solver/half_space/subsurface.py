@@ -31,6 +31,7 @@ import scipy.fft
 
 from sa_solver import checks
 from sa_solver.errors import InputError
+from sa_solver.half_space.layered_stress import layered_rectangles, layered_strips
 from sa_solver.half_space.operator import padded_shape
 from sa_solver.half_space.subsurface_influence import (
     INDICES,
@@ -101,7 +102,7 @@ class SubsurfaceStress:
         """
         if body not in MIRROR:
             raise SubsurfaceError(f"body is {body}: give 1 or 2")
-        self.grid, self.poisson = grid, material.poisson
+        self.grid, self.material = grid, material
         self.count = 0
         self._mirror = MIRROR[body]
         self._padded = padded_shape(grid)
@@ -267,10 +268,24 @@ class SubsurfaceStress:
         """Return the tractions on the half-space z > 0 to which the body is mirrored."""
         return traction * self._mirror[:, None, None]
 
+    @property
+    def _elasticity(self) -> object:
+        """What decides about the stress: Poisson's ratio, and how stiff layers are."""
+        body = self.material
+        return (body.young, body.poisson, body.layers) if body.layers else body.poisson
+
     def _influence(self, edges: list[Array], depth: float) -> Array:
+        body = self.material
         if self.grid.line:
-            return strip_stress(edges[0], depth, self.poisson)[..., None]
-        return rectangle_stress(edges[0], edges[1], depth, self.poisson)
+            strips = (
+                layered_strips(edges[0], depth, body)
+                if body.layers
+                else strip_stress(edges[0], depth, body.poisson)
+            )
+            return strips[..., None]
+        if body.layers:
+            return layered_rectangles(edges[0], edges[1], depth, body)
+        return rectangle_stress(edges[0], edges[1], depth, body.poisson)
 
     def _plan(self, depth: float, rows: Sequence[int]) -> SpectralFilter:
         """Return the filter from tractions to the components ``rows`` of stress at a ``depth``.
@@ -345,7 +360,7 @@ def sections(
     (6, 50, 2) 0.0
     """
     stresses: list[Array] = []
-    shared: dict[tuple[Grid, float, float], list[tuple[SubsurfaceStress, Array, Array]]] = {}
+    shared: dict[tuple[Grid, object, float], list[tuple[SubsurfaceStress, Array, Array]]] = {}
     at = checks.number("place of a section", at, error=SubsurfaceError)
     for body, traction, depths in wanted:
         depths = checks.array("depths", depths, (None,), error=SubsurfaceError)
@@ -356,7 +371,7 @@ def sections(
         if spectra is None:
             continue
         for column, depth in enumerate(depths.tolist()):
-            alike = shared.setdefault((body.grid, body.poisson, depth), [])
+            alike = shared.setdefault((body.grid, body._elasticity, depth), [])
             alike.append((body, spectra, stress[:, :, column]))
     for (_, _, depth), alike in shared.items():
         bodies, sources, columns = zip(*alike, strict=True)

@@ -7,9 +7,13 @@ half of the values along the other axis. This takes half of the time and memory 
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from sa_solver.half_space.influence import Z, rectangle_influence, strip_influence
+from sa_solver.half_space.layered_influence import layered_influence
+from sa_solver.half_space.layers import Compliances, pair_compliances
 from sa_solver.types import Array, ElasticPair, Grid
 
 Period = tuple[int, int]
@@ -19,9 +23,10 @@ Odd = tuple[bool, bool]
 class Coefficients:
     """Cached influence coefficients of the cells of a grid, by distance.
 
-    Kernels of rectangles are homogeneous of degree one: cells twice as large displace each other
-    twice as far. The coefficients of a grid with cells of the same proportions, and no more of
-    them, are therefore scaled from those of a ``finer`` grid, which are needed there anyway.
+    Kernels of rectangles are homogeneous of degree one where the bodies have no layers: cells twice
+    as large displace each other twice as far. The coefficients of a grid with cells of the same
+    proportions, and no more of them, are therefore scaled from those of a ``finer`` grid, which are
+    needed there anyway.
     """
 
     def __init__(
@@ -58,9 +63,16 @@ class Coefficients:
 
         The edges are those of :func:`.influence.rectangle_influence`.
         """
+        outermost = self._pair.surface
         if self._grid.line:
-            return strip_influence(edges_x, self._pair, row, column, self._datum)[:, None]
-        return rectangle_influence(edges_x, edges_y, self._pair, row, column)
+            strips = strip_influence(edges_x, outermost, row, column, self._datum)
+            if self._pair.layered:
+                strips += layered_influence(self._pair).strips(edges_x, row, column, self._datum)
+            return strips[:, None]
+        rectangles = rectangle_influence(edges_x, edges_y, outermost, row, column)
+        if self._pair.layered:
+            rectangles += layered_influence(self._pair).rectangles(edges_x, edges_y, row, column)
+        return rectangles
 
     def _whole(self, row: int, column: int) -> Array:
         if self._finer is None:
@@ -86,7 +98,8 @@ class Coefficients:
     def _lies_in(self, finer: Coefficients) -> bool:
         """Return whether the cells have the proportions of those of ``finer`` and are no more."""
         (x, y), (fine_x, fine_y) = self._grid.pitch, finer._grid.pitch
-        alike = not self._grid.line and x / fine_x == y / fine_y
+        scalable = not self._grid.line and not self._pair.layered
+        alike = scalable and x / fine_x == y / fine_y
         return alike and _within(self._counts, finer._counts)
 
 
@@ -119,9 +132,10 @@ def wave_symbol(grid: Grid, pair: ElasticPair, row: int, column: int) -> Array:
     """Return displacements ``row`` under unit waves of traction ``column`` on a periodic grid.
 
     They have the frequencies of numpy's ``rfft2``, ``(nx, ny//2 + 1)`` [mm/MPa], and are 0 for the
-    mean traction. With the compliances n, s and v of a ``pair`` of similar bodies, waves of the
-    wave number k at the angle θ to x have n/k under pressure, and (s - v cos²θ)/k, (s - v sin²θ)/k
-    and -v cosθ sinθ/k under shear. These are the transforms of the kernels in
+    mean traction. With the compliances n, a and s of a ``pair`` of similar bodies under pressure
+    and under shear along and across a wave, waves of the wave number k at the angle θ to x have n/k
+    under pressure, and (s + (a - s) cos²θ)/k, (s + (a - s) sin²θ)/k and (a - s) cosθ sinθ/k under
+    shear. Without layers these are the transforms of the kernels in
     :mod:`sa_solver.half_space.influence`.
     """
     (nx, ny), (dx, dy) = grid.shape, grid.pitch
@@ -129,10 +143,13 @@ def wave_symbol(grid: Grid, pair: ElasticPair, row: int, column: int) -> Array:
     frequency = np.hypot(*along)
     frequency[0, 0] = np.inf
     wave_number = 2.0 * np.pi * frequency
+    compliances = _on_grid(pair, wave_number)
     if row == column == Z:
-        return np.asarray(pair.normal / wave_number)
+        return np.asarray(compliances.normal / wave_number)
     cosines = along[row] / frequency, along[column] / frequency
-    symbol = (pair.shear * (row == column) - pair.poisson * cosines[0] * cosines[1]) / wave_number
+    difference = compliances.along - compliances.across
+    mean = compliances.across * (row == column)
+    symbol = (mean + difference * cosines[0] * cosines[1]) / wave_number
     if row != column:
         # A wave of two cells along an axis runs in both directions, which cancel.
         if nx % 2 == 0:
@@ -140,6 +157,16 @@ def wave_symbol(grid: Grid, pair: ElasticPair, row: int, column: int) -> Array:
         if ny % 2 == 0:
             symbol[:, ny // 2] = 0.0
     return np.asarray(symbol)
+
+
+def _on_grid(pair: ElasticPair, wave_number: Array) -> Compliances:
+    """Return the compliances at ``wave_number`` of any shape, solved once for equal ones."""
+    if not pair.layered:
+        return pair_compliances(pair, np.ones(1))
+    different, place = np.unique(wave_number, return_inverse=True)
+    found = pair_compliances(pair, different)
+    place = place.reshape(wave_number.shape)
+    return Compliances(*(getattr(found, f.name)[place] for f in fields(Compliances)))
 
 
 def _half_spectrum(kernel: Array, axis: int, period: int, odd: bool) -> Array:
