@@ -1,6 +1,6 @@
 """Influence coefficients: stress in a layered body under uniform traction on a rectangle or strip.
 
-The stress at a depth is a sum over waves of traction (:func:`.layers.wave_stress`). In the outermost
+The stress at a depth is a sum over waves of traction (:func:`.layers.wave_stress`). In the outer
 layer the part of a body of its material alone is known in closed form
 (:mod:`sa_solver.half_space.subsurface_influence`), and what is added is smooth over the thickness
 of the layer. Below it the whole stress is smooth over the depth.

@@ -182,6 +182,10 @@ GIVEN |= {
     | {"structure": GIVEN[kind]["structure"] | {"flat": flat}, "load_path": LEGS}
     for kind, flat in FLATS.items()
 }
+# Bodies that do not wear may have layers.
+LAYERS = [{"thickness": "50 um", "young": "50 GPa", "poisson": 0.3}]
+for kind in FLATS:
+    GIVEN[kind]["materials.body_1.layers"] = {ALWAYS: LAYERS}
 # Cases in time: other joints, factors of their parameters, and other excitations.
 JOINT = {"normal_load": 60, "friction": 0.1, "stiffness": 1e4}
 JOINTS = {law: {"law": law, **JOINT} for law in ("jenkins", "uniform_iwan", "four_parameter_iwan")}

@@ -144,7 +144,8 @@ class ElasticSection(Section):
     """Base of the materials of a case: given by name, by numbers, or both."""
 
     refused: ClassVar[Mapping[str, str]] = {
-        "density": "nothing here depends on mass; allowed: leave it out"
+        "density": "nothing here depends on mass; allowed: leave it out",
+        "layers": "layers do not wear; allowed: with `analysis: contact`",
     }
 
     material: Annotated[str, MaterialName()] | None = entry(
@@ -190,9 +191,8 @@ class ElasticSection(Section):
 
     def elastic(self) -> ElasticMaterial:
         """Return the material for the solvers; no yield stress becomes an infinite one."""
-        properties = {k: v for k, v in self.model_dump().items() if v is not None}
-        properties.pop("material", None)
-        return ElasticMaterial(**properties)
+        given = self.model_dump(exclude={"material", "layers"})
+        return ElasticMaterial(**{k: v for k, v in given.items() if v is not None})
 
 
 class Friction(Section):

@@ -23,6 +23,8 @@ RIGID_2 = "  body_2: {young: 115 GPa, poisson: 0.29}", "  body_2: rigid"
 SPHERE = "shape: sphere, radius: 10 mm"
 NO_FRICTION = "friction: {coefficient: 0.7}\n", ""
 PERIODIC = BALL.replace("size: [1 mm, 1 mm]", "size: [1 mm, 1 mm], boundary: periodic")
+LAYER = "{thickness: 50 um, young: 20 GPa, poisson: 0.3}"
+COATED = BALL.replace(RIGID_2[0], f"{RIGID_2[0][:-1]}, layers: [{LAYER}]}}")
 # Base, text to replace, its replacement, key in the message.
 WRONG = [
     (BALL, "shape: sphere, ", "", "structure.shape"),
@@ -48,6 +50,13 @@ WRONG = [
     (PERIODIC, "Qx: 210 N", "bulk_stress_1: 1 MPa", "load_path"),
     (PERIODIC, *RIGID_2, "materials"),
     (ROLLER, "size: 2 mm", "size: 2 mm, datum: 9 mm, boundary: periodic", "contact.datum"),
+    (COATED, "thickness: 50 um", "thickness: -1 um", "materials.body_2.layers.0.thickness"),
+    (COATED, "thickness: 50 um, ", "", "materials.body_2.layers.0.thickness"),
+    (COATED, LAYER, "paint", "materials.body_2.layers.0"),
+    (COATED, "young: 20 GPa, ", "", "materials.body_2.layers.0.young"),
+    (COATED, "Qx: 210 N", "bulk_stress_2: 1 MPa", "materials.body_2"),
+    (COATED, "size: [1 mm, 1 mm]", "size: [1 mm, 1 mm], boundary: periodic", "materials"),
+    (COATED.replace("Qx: 210 N", "Mx: 1 N*mm"), *NO_FRICTION, "friction"),
 ]
 
 
@@ -71,6 +80,17 @@ def test_bases_are_cases_that_read_back_equal():
         case = parse_case(text, "case.yaml")
         assert isinstance(case, kind)
         assert parse_case(dump_case(case), "dump") == case
+
+
+def test_layers_are_those_of_the_library():
+    case = parse_case(COATED.replace(LAYER, f"{LAYER}, {{thickness: 1 um, material: 304L}}"), "c")
+    first, second = case.materials.body_2.elastic().layers
+    assert (first.thickness, first.young, first.poisson) == pytest.approx((0.05, 20e3, 0.3))
+    assert second.young == case.materials.body_2.layers[1].young
+    assert parse_case(dump_case(case), "dump") == case
+    (row,) = (text for title, text in case.outline() if title == "layers")
+    assert row.startswith("body_2: (thickness 50 µm")
+    assert "304L" in row
 
 
 def test_like_bodies_that_are_only_pressed_need_no_friction():

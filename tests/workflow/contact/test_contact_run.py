@@ -4,12 +4,22 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 
+from sa_solver import (
+    ContactLoad,
+    ElasticPair,
+    FrictionalContact,
+    Grid,
+    HalfSpace,
+    Layer,
+    Material,
+)
 from sa_solver.cycles.history import History
 from tests.workflow.command_line import invoke
 from tests.workflow.conftest import manifest_has_all
@@ -264,6 +274,23 @@ def test_a_periodic_patch_has_no_border(tmp_path):
     assert own["Qx"] == pytest.approx(210.0, rel=1e-7)
     for quantity in ("peak_pressure", "approach", "shift_x", "contact_radius"):
         assert own[quantity] == pytest.approx(moved[quantity], rel=1e-5)
+
+
+def test_a_coated_ball_is_that_of_the_library(tmp_path):
+    layer = "layers: [{thickness: 50 um, young: 20 GPa, poisson: 0.3}]"
+    case = tmp_path / "coated.yaml"
+    body = "  body_2: {young: 115 GPa, poisson: 0.29"
+    assert body in SMALL
+    case.write_text(SMALL.replace(body, f"{body}, {layer}"), encoding="utf-8")
+    assert invoke("run", case, "--out", tmp_path / "out").exit_code == 0
+    first = summary_of(tmp_path / "out")["states"][0]
+    plain, grid = Material(115e3, 0.29), Grid.covering((1.0, 1.0), (32, 32))
+    pair = ElasticPair(plain, replace(plain, layers=(Layer(0.05, 20e3, 0.3),)))
+    contact = FrictionalContact(HalfSpace(grid, pair), 0.7)
+    height = (grid.x**2 + grid.y**2) / 20.0
+    load = ContactLoad(np.array([first["P"], 0.0, 0.0, 0.0, 0.0, 0.0]))
+    state = contact.advance(contact.unloaded_state(height), height, load)
+    assert first["peak_pressure"] == pytest.approx(state.pressure.max(), rel=1e-6)
 
 
 def test_a_step_between_the_borders_of_a_periodic_patch_warns(tmp_path):

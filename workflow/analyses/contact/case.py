@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -15,7 +16,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from sa_solver.surfaces import shapes
-from sa_solver.types import Array, ElasticPair, Grid
+from sa_solver.types import Array, ElasticPair, Grid, Layer
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.load_path import ContactPath, LegsOrFile, LineContactPath
 from workflow.analyses.contact.plausibility import (
@@ -46,7 +47,7 @@ from workflow.case.sections import (
     entry,
 )
 from workflow.case.source import Source
-from workflow.case.text.plain import of_bodies, plain, shape_in_words
+from workflow.case.text.plain import body_text, merged_rows, of_bodies, plain, shape_in_words
 from workflow.messages.warning_kinds import Notice
 from workflow.models.gaps import GapFunction
 from workflow.models.uncoupled.load_table import PRESSING, LoadTable
@@ -176,17 +177,24 @@ class BodyMaterial(ElasticSection):
     )
 
 
+NAME_OR_SECTION = Discriminator(
+    lambda value: "(name)" if str(value).startswith("rigid") else "(section)"
+)
 Body = Annotated[
     Annotated[BodyMaterial, Tag("(section)")] | Annotated[Literal["rigid"], Tag("(name)")],
-    Discriminator(lambda value: "(name)" if str(value).startswith("rigid") else "(section)"),
+    NAME_OR_SECTION,
 ]
+
+
+LOWER = "the lower, fixed body; a material's name, its entries or the word rigid"
+UPPER = "the upper, moving body; a material's name, its entries or the word rigid"
 
 
 class BodyMaterials(Section):
     """The two bodies in contact."""
 
-    body_1: Body = entry("the lower, fixed body; a material's name, its entries or the word rigid")
-    body_2: Body = entry("the upper, moving body; a material's name, its entries or the word rigid")
+    body_1: Body = entry(LOWER)
+    body_2: Body = entry(UPPER)
 
     @model_validator(mode="after")
     def _one_is_elastic(self) -> BodyMaterials:
@@ -197,6 +205,42 @@ class BodyMaterials(Section):
         return self
 
 
+class LayerSection(ElasticSection):
+    """Elastic layer that is bonded to what lies below it."""
+
+    thickness: Length = entry("thickness [mm]", "50 um")
+    young: Stress = entry("Young's modulus [MPa]", "50 GPa")
+    poisson: Poisson = entry("Poisson's ratio [1]", 0.3)
+
+    def layer(self) -> Layer:
+        """Return the layer for the solvers."""
+        return Layer(self.thickness, self.young, self.poisson)
+
+
+class LayeredMaterial(BodyMaterial):
+    """Isotropic linear elastic material, with the layers on its surface."""
+
+    layers: tuple[LayerSection, ...] = entry(
+        "layers on the surface, such as coatings, the outermost first", default=()
+    )
+
+    def elastic(self) -> ElasticMaterial:
+        return replace(super().elastic(), layers=tuple(n.layer() for n in self.layers))
+
+
+LayeredBody = Annotated[
+    Annotated[LayeredMaterial, Tag("(section)")] | Annotated[Literal["rigid"], Tag("(name)")],
+    NAME_OR_SECTION,
+]
+
+
+class LayeredMaterials(BodyMaterials):
+    """The two bodies in contact, with their layers."""
+
+    body_1: LayeredBody = entry(LOWER)
+    body_2: LayeredBody = entry(UPPER)
+
+
 def elastic(body: Body) -> ElasticMaterial:
     """Return the material of a body in the form that the solvers need."""
     return RIGID if body == "rigid" else body.elastic()
@@ -205,8 +249,13 @@ def elastic(body: Body) -> ElasticMaterial:
 def unworn_contact(
     shape: Section, bodies: Sequence[ElasticSection | str], load: float, line: bool
 ) -> tuple[float, float] | None:
-    """Return width [mm] and largest pressure [MPa] of a ball or cylinder, None for other shapes."""
+    """Return width [mm] and largest pressure [MPa] of a ball or cylinder.
+
+    None is returned for other shapes, and for layered bodies.
+    """
     radius = getattr(shape, "radius", None)
+    if any(getattr(body, "layers", ()) for body in bodies):
+        return None
     compliance = sum(
         (1.0 - body.elastic().poisson ** 2) / body.elastic().young
         for body in bodies
@@ -218,14 +267,31 @@ def unworn_contact(
     return 2.0 * half_width, pressure
 
 
+def layers_in_words(materials: LayeredMaterials) -> list[tuple[str, str]]:
+    """Return a row with the layers of each body that has some."""
+    texts = {}
+    for name in LayeredMaterials.model_fields:
+        if layers := getattr(getattr(materials, name), "layers", ()):
+            texts[name] = " on ".join(f"({body_text(layer)})" for layer in layers)
+    return merged_rows("layers", texts)
+
+
 # --- loads --------------------------------------------------------------------------------------
 
 
 def check_bulk_stress(table: LoadTable, materials: BodyMaterials) -> None:
-    """Refuse bulk stress in a rigid body."""
+    """Refuse bulk stress in a rigid or layered body."""
     for number in (1, 2):
         body, key = f"body_{number}", f"bulk_stress_{number}"
-        if key in table.columns and getattr(materials, body) == "rigid":
+        if key not in table.columns:
+            continue
+        if getattr(getattr(materials, body), "layers", ()):
+            raise disagreement(
+                f"the bulk stress of a layered body is not computed, but load_path has {key}; "
+                "allowed: no layers, or no bulk stress",
+                f"materials.{body}",
+            )
+        if getattr(materials, body) == "rigid":
             raise disagreement(
                 f"a rigid body carries no bulk stress, but load_path has {key}; "
                 "allowed: an elastic body",
@@ -323,7 +389,7 @@ class BodiesCase(Case):
 
     analysis: Literal["contact"] = entry("kind of analysis", "contact")
     structure: Bodies
-    materials: BodyMaterials = entry("the two bodies in contact")
+    materials: LayeredMaterials = entry("the two bodies in contact")
     friction: Friction = entry(
         "Coulomb's law; not needed if similar bodies are only pressed",
         default=Friction(coefficient=0.0),
@@ -363,7 +429,7 @@ class BodiesCase(Case):
         if not self._pair.similar:
             raise disagreement(
                 "a periodic contact of dissimilar bodies is not computed; allowed: bodies of equal "
-                "(1 - 2ν)/G, or contact.boundary: free",
+                "(1 - 2ν)/G, both with the same layers, or contact.boundary: free",
                 "materials",
             )
 
@@ -393,6 +459,7 @@ class BodiesCase(Case):
             ("loads", ", ".join(self.load_path.ranges())),
             *surfaces_in_words(self.structure, grid),
             *of_bodies("material", self.materials),
+            *layers_in_words(self.materials),
             ("friction", f"{self.friction.coefficient:g}" if self.friction.coefficient else "none"),
             ("contact", f"{cells}{repeated}, history {self.contact.history}"),
         ]
