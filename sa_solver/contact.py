@@ -25,7 +25,8 @@ from sa_solver.cycles.increments import dissipated, of_nearest
 from sa_solver.dissimilar.contact import CoupledContact, CoupledContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.normal.contact import NormalContact, NormalStart, NormalState, checked_heights
+from sa_solver.normal.contact import NormalContact, checked_heights
+from sa_solver.normal.state import NormalStart, NormalState
 from sa_solver.rigid_modes import NORMAL, PLANAR
 from sa_solver.tangential.ciavarella_jaeger import first_loading
 from sa_solver.tangential.contact import (
@@ -75,11 +76,14 @@ class FrictionalContact:
         friction: float,
         tolerance: float = 1e-8,
         sliding: SlidingRule = "force",
+        hardness: float | None = None,
     ) -> None:
         """Prepare the solvers for ``half_space`` and Coulomb's coefficient ``friction`` µ.
 
         ``sliding`` selects how the direction of gross slip is found: see
-        :mod:`sa_solver.tangential.gross_slip`. Raises FrictionError unless µ is finite and >= 0.
+        :mod:`sa_solver.tangential.gross_slip`. The ``hardness`` [MPa] bounds the pressure of
+        similar bodies: see :mod:`sa_solver.normal.hardness`. Raises FrictionError unless µ is
+        finite and >= 0, and InputError for a hardness of dissimilar bodies.
         """
         friction = checks.number("friction", friction, least=0.0, error=FrictionError)
         tolerance = checks.number("tolerance", tolerance, above=0.0)
@@ -87,6 +91,14 @@ class FrictionalContact:
         self.half_space, self.grid = half_space, half_space.grid
         self.friction, self.tolerance, self._sliding = friction, tolerance, sliding
         self._modes = planar_modes(half_space)
+        if hardness is not None:
+            hardness = checks.number("hardness", hardness, above=0.0)
+            if not half_space.pair.similar:
+                raise InputError(
+                    "the yield of dissimilar bodies is not computed: give no hardness, or bodies "
+                    "of equal (1 - 2ν)/G"
+                )
+        self._hardness = hardness
 
     def unloaded_state(self, height: Array, along: Array | None = None) -> ContactState:
         """Return the state of the unloaded bodies, with the gap ``height`` ``(nx, ny)`` [mm].
@@ -108,6 +120,7 @@ class FrictionalContact:
             converged=True,
             cell_area=self.grid.cell_area,
             along=along,
+            flattening=None if self._hardness is None else np.zeros(self.grid.shape),
         )
 
     def advance(
@@ -129,6 +142,8 @@ class FrictionalContact:
         guess = start or ContactStart()
         if not self.half_space.pair.similar:
             return self._advance_dissimilar(before, height, load, guess)
+        if before.flattening is not None:
+            height = height + before.flattening
         normal = self._press(before, height, load, guess.normal)
         limit = self.friction * normal.pressure
         offset, area = self.offset(before, load), self.grid.cell_area
@@ -138,8 +153,9 @@ class FrictionalContact:
             carried = self._carry_force(before, limit, offset, load) if creeps else None
             tangential, sliding = (tangential, True) if carried is None else (carried, False)
         elif self.two_normal_problems(before, load) and abs(load.values[1]) < limit.sum() * area:
+            flattened = height if normal.flattening is None else height + normal.flattening
             tangential = first_loading(
-                self.normal, height, normal, self.friction, load.values[1], self.tolerance
+                self.normal, flattened, normal, self.friction, load.values[1], self.tolerance
             )
         else:
             begin = ContactStart(shear=before.shear) if guess.shear is None else guess
@@ -208,6 +224,7 @@ class FrictionalContact:
             tilt_y=tilt_y,
             tolerance=self.tolerance,
             start=start,
+            hardness=self._hardness,
         )
 
     def _shear(
@@ -331,6 +348,9 @@ class FrictionalContact:
         sliding: bool,
     ) -> ContactState:
 
+        flattening = before.flattening
+        if flattening is not None and normal.flattening is not None:
+            flattening = flattening + normal.flattening
         rigid = np.array([normal.approach, 0.0, 0.0, normal.tilt_x, normal.tilt_y, 0.0])
         rigid[list(PLANAR)] = before.rigid[list(PLANAR)] + tangential.motion
         resultants = np.array([normal.P, 0.0, 0.0, normal.Mx, normal.My, 0.0])
@@ -354,6 +374,7 @@ class FrictionalContact:
             convolutions=normal.convolutions + tangential.convolutions,
             border_load=normal.border_load,
             cell_area=self.grid.cell_area,
+            flattening=flattening,
         )
 
     def _slip(

@@ -8,7 +8,7 @@ import numpy as np
 
 from sa_solver import checks
 from sa_solver.errors import InputError
-from sa_solver.normal.contact import NormalStart
+from sa_solver.normal.state import NormalStart
 from sa_solver.rigid_modes import NORMAL, RESULTANTS
 from sa_solver.traction_state import TractionState
 from sa_solver.types import Array, Mask
@@ -210,6 +210,8 @@ class ContactState(TractionState):
         Cost of the increment in convolutions.
     border_load
         Share of P that the outermost cells carry; above 0 the grid is too small.
+    flattening
+        Depth ``(nx, ny)`` [mm] by which the surfaces have yielded so far, None without a hardness.
     """
 
     traction: Array
@@ -229,6 +231,7 @@ class ContactState(TractionState):
     message: str = ""
     convolutions: int = 0
     border_load: float = 0.0
+    flattening: Array | None = None
 
     @property
     def slipping(self) -> Mask:

@@ -184,6 +184,7 @@ def march_history(
     history: Literal["auto", "full", "reversals"] = "auto",
     accuracy: float = ACCURACY,
     tolerance: float = 1e-8,
+    hardness: float | None = None,
     progress: Progress = lambda row, state, share: None,
 ) -> History:
     """Solve a loading history on surfaces that do not wear.
@@ -208,6 +209,8 @@ def march_history(
         Bound on the errors of shear and energy due to increments.
     tolerance
         Tolerance of the contact problems.
+    hardness
+        Largest pressure [MPa] before similar bodies yield: :mod:`sa_solver.normal.hardness`.
     progress
         Callback that receives the row, its state and the approximate share of the work done; rows
         are repeated when increments are split.
@@ -242,7 +245,7 @@ def march_history(
     >>> print(f"{error:.1f} of {np.abs(exact).max():.1f} MPa")
     2.8 of 146.2 MPa
     """
-    contact = FrictionalContact(half_space, friction, tolerance)
+    contact = FrictionalContact(half_space, friction, tolerance, hardness=hardness)
     checks.choice("history", history, ("auto", "full", "reversals"), HistoryError)
     accuracy = checks.number("accuracy", accuracy, above=0.0, error=HistoryError)
     obstacle = _obstacle_to_legs(half_space, path)

@@ -42,7 +42,8 @@ from sa_solver.cycles.tangential_loop import (
 )
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.normal.contact import NormalContact, NormalStart, NormalState, checked_heights
+from sa_solver.normal.contact import NormalContact, checked_heights
+from sa_solver.normal.state import NormalStart, NormalState
 from sa_solver.ties import SAME
 from sa_solver.types import Array, Tilt
 

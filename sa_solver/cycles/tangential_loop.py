@@ -33,7 +33,7 @@ from sa_solver.contact_state import ContactLoad, ContactState
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.half_space.influence import Z
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.normal.contact import NormalState
+from sa_solver.normal.state import NormalState
 from sa_solver.types import Array, Mask
 
 State = TypeVar("State", ContactState, NormalState)

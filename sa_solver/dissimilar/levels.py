@@ -22,7 +22,8 @@ from sa_solver.half_space.active_box import Box, OnBoxes
 from sa_solver.half_space.influence import Z
 from sa_solver.half_space.nested_grids import GridTransfer, coarsened
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.normal.contact import NormalContact, NormalContactError, NormalState
+from sa_solver.normal.contact import NormalContact, NormalContactError
+from sa_solver.normal.state import NormalState
 from sa_solver.rigid_modes import NORMAL, RigidModes
 from sa_solver.types import Array, Mask
 

@@ -15,7 +15,7 @@ Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from sa_solver.errors import ContactProblemError
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.control import NormalContactError as NormalContactError
 from sa_solver.normal.control import NormalControl
+from sa_solver.normal.hardness import yielding_state
 from sa_solver.normal.nested_solver import NestedSolver
 from sa_solver.normal.problem import (
     Iterate,
@@ -36,6 +37,7 @@ from sa_solver.normal.problem import (
     normal_residuals,
 )
 from sa_solver.normal.separation import separating_tilt
+from sa_solver.normal.state import NormalStart, NormalState
 from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, NormalModes, mode_lengths
 from sa_solver.surfaces.absent_cells import without_absent
 from sa_solver.types import Array, Grid
@@ -46,92 +48,6 @@ TOLERANCE = 1e-8
 BALANCED = 1e-12
 """Relative change in a balance below which the pressure was balanced before. Rounding of sums over
 a grid is about 1e-15."""
-
-
-@dataclass(frozen=True)
-class NormalStart:
-    """Initial guess of a solve: pressure [MPa] and its displacement K p [mm], ``(nx, ny)``."""
-
-    pressure: Array
-    displacement: Array
-
-
-@dataclass(frozen=True)
-class NormalState:
-    """Solution of a normal contact problem.
-
-    Attributes
-    ----------
-    pressure
-        Pressure ``(nx, ny)`` [MPa].
-    gap
-        Gap ``(nx, ny)`` [mm].
-    displacement
-        Elastic displacement K p ``(nx, ny)`` [mm].
-    approach, tilt_x, tilt_y
-        Rigid motions δz [mm], φx and φy [rad]. A tilt that the pressed cells cannot resist, because
-        they lie on one line or point, is the smallest possible.
-    P, Mx, My
-        Resultants of the pressure [N, N mm; per mm on a line grid].
-    residuals
-        Residuals of the state, which do not depend on the method.
-    converged
-        Whether all residuals are within the tolerance.
-    message
-        What is wrong and what to try, if the state has not ``converged`` or the contact reaches the
-        border of the grid; empty otherwise.
-    convolutions
-        Cost of the solution in convolutions on the whole grid, by the size of the transforms,
-        rounded up. Each iteration also transforms an unpadded field, at a quarter of the cost of a
-        convolution, which is not counted.
-    border_load
-        Share of P that the outermost cells carry; above 0 the grid is too small.
-    cell_area
-        Area of a cell of the grid [mm²].
-    method
-        Method that found the solution.
-    """
-
-    pressure: Array
-    gap: Array
-    displacement: Array
-    approach: float
-    tilt_x: float
-    tilt_y: float
-    P: float
-    Mx: float
-    My: float
-    residuals: NormalResiduals
-    converged: bool
-    message: str
-    convolutions: int
-    border_load: float
-    cell_area: float
-    method: str = ""
-
-    @property
-    def contact_area(self) -> float:
-        """Area of the cells in contact [mm²]; for a line contact its width [mm]."""
-        return float(np.count_nonzero(self.pressure)) * self.cell_area
-
-    @property
-    def elastic_energy(self) -> float:
-        """Elastic energy ½ Σ p u S of both bodies [N mm], with their displacement u = K p.
-
-        For bodies that do not wear it equals the work of P and the moments since the bodies were
-        apart. For a line contact it is per mm, and within the datum of the half-space.
-        """
-        return 0.5 * float(np.vdot(self.pressure, self.displacement)) * self.cell_area
-
-    @property
-    def start(self) -> NormalStart:
-        """Initial guess for the next solve on the same grid."""
-        return NormalStart(self.pressure, self.displacement)
-
-    @property
-    def touches_border(self) -> bool:
-        """True if the outermost cells of the grid carry load."""
-        return self.border_load > 0.0
 
 
 class NormalContact:
@@ -179,6 +95,7 @@ class NormalContact:
         tolerance: float = TOLERANCE,
         start: NormalStart | None = None,
         compliance: Array | None = None,
+        hardness: float | None = None,
     ) -> NormalState:
         """Solve for the pressure, the gap and the unknown motions and resultants.
 
@@ -201,13 +118,16 @@ class NormalContact:
             Initial guess, from any state on the same grid.
         compliance
             Local compliance D >= 0 ``(nx, ny)`` [mm/MPa].
+        hardness
+            Largest pressure [MPa] that the softer surface bears before it flattens:
+            :mod:`sa_solver.normal.hardness`. Not together with ``compliance``.
 
         Raises
         ------
         NormalContactError
             For heights or compliances that are NaN, not numbers or of another shape, both of a
-            force and its motion, neither ``P`` nor ``approach``, a negative load, or a moment that
-            no pressure on the grid can carry.
+            force and its motion, neither ``P`` nor ``approach``, a negative load, or a load or
+            moment that no pressure on the grid can carry.
 
         Examples
         --------
@@ -230,12 +150,22 @@ class NormalContact:
             _check_periodic(height, control)
         control.check_moments(self.grid)
 
-        def pressed(height: Array) -> NormalState:
-            return self._pressed(height, control, tolerance, start, compliance)
+        def elastic(
+            height: Array, control: NormalControl, start: NormalStart | None
+        ) -> NormalState:
+            def pressed(height: Array) -> NormalState:
+                return self._pressed(height, control, tolerance, start, compliance)
 
-        delta, tilt_x, tilt_y = map(float, control.motions)
-        imposed = float(control.resultants[0]), delta, tilt_x, tilt_y
-        return without_absent(height, self.half_space, imposed, pressed, NormalContactError)
+            delta, tilt_x, tilt_y = map(float, control.motions)
+            imposed = float(control.resultants[0]), delta, tilt_x, tilt_y
+            return without_absent(height, self.half_space, imposed, pressed, NormalContactError)
+
+        if hardness is None:
+            return elastic(height, control, start)
+        hardness = checks.number("hardness", hardness, above=0.0, error=NormalContactError)
+        if compliance is not None:
+            raise NormalContactError("hardness and compliance are both given: give one of them")
+        return yielding_state(elastic, self.half_space, height, control, hardness, start)
 
     # -- steps of solve -----------------------------------------------------------------------
     def _pressed(

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sa_solver.normal.contact import NormalContact, NormalState
+from sa_solver.normal.contact import NormalContact
+from sa_solver.normal.state import NormalState
 from sa_solver.tangential.contact import TangentialResiduals, TangentialState
 from sa_solver.types import Array
 

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.normal.contact import NormalContact, NormalState
+from sa_solver.normal.contact import NormalContact
+from sa_solver.normal.state import NormalState
 from sa_solver.rigid_modes import RESULTANTS
 from sa_solver.tangential.contact import TangentialContact, TangentialState
 from sa_solver.types import Array

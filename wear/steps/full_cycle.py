@@ -17,7 +17,7 @@ from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
 from sa_solver.cycles.increments import before, of_nearest
 from sa_solver.errors import ContactProblemError
 from sa_solver.load_history import LoadHistory
-from sa_solver.normal.contact import NormalStart
+from sa_solver.normal.state import NormalStart
 from sa_solver.types import Array, Grid, Mask
 from wear.contact.drive import Drive
 from wear.steps.stepping import ContactFailure

@@ -34,7 +34,8 @@ import numpy as np
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.half_space.influence import Z
 from sa_solver.load_history import LoadHistory
-from sa_solver.normal.contact import NormalContact, NormalStart, NormalState
+from sa_solver.normal.contact import NormalContact
+from sa_solver.normal.state import NormalStart, NormalState
 from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import SAME, first_largest
 from sa_solver.types import Array, Grid

@@ -66,6 +66,7 @@ def state(shear, resultants, rigid, energy=0.0, grid=GRID, pressure=None):
         message="",
         convolutions=20,
         border_load=0.0,
+        flattening=None,
     )
 
 

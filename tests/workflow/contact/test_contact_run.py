@@ -77,6 +77,7 @@ def states(count, **last):
         "message": "",
         "convolutions": 1,
         "border_load": 0.0,
+        "flattening": None,
     }
     return [SimpleNamespace(**(nothing | (last if k == count - 1 else {}))) for k in range(count)]
 
@@ -274,6 +275,21 @@ def test_a_periodic_patch_has_no_border(tmp_path):
     assert own["Qx"] == pytest.approx(210.0, rel=1e-7)
     for quantity in ("peak_pressure", "approach", "shift_x", "contact_radius"):
         assert own[quantity] == pytest.approx(moved[quantity], rel=1e-5)
+
+
+def test_what_has_yielded_is_in_the_results(tmp_path):
+    case = tmp_path / "hard.yaml"
+    case.write_text(SMALL.replace("history: full", "hardness: 1 GPa"), encoding="utf-8")
+    result = invoke("run", case, "--out", tmp_path / "out")
+    assert result.exit_code == 0
+    last = summary_of(tmp_path / "out")["states"][-1]
+    assert last["peak_pressure"] == pytest.approx(1000.0, rel=1e-5)
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        fields = list(file["contact/bodies"].values())[-1]
+        flattening, pressure = fields["flattening"][()], fields["pressure"][()]
+    assert last["flattening"] == flattening.max()
+    assert last["flattened_volume"] == pytest.approx(flattening.sum() / 32**2)
+    assert (pressure[flattening > 0.0] >= 1000.0 * (1.0 - 1e-9)).all()
 
 
 def test_a_coated_ball_is_that_of_the_library(tmp_path):

@@ -313,6 +313,12 @@ class HalfSpaceGrid(Section):
         "free",
         default="free",
     )
+    hardness: Stress | None = entry(
+        "largest pressure before the softer body yields and stays flatter, about 3 times its yield "
+        "stress; without it bodies are elastic [MPa]",
+        "6 GPa",
+        default=None,
+    )
     tolerance: Tolerance = entry("relative tolerance of every residual [1]", 1e-8, default=1e-8)
     history: Literal["auto", "full", "reversals"] = entry(
         "auto: the cheapest that is accurate; full: all increments; reversals: only turning points",
@@ -413,10 +419,30 @@ class BodiesCase(Case):
         check_bulk_stress(self.load_path.table(), self.materials)
         if self.contact.periodic:
             self._check_periodic()
+        if self.contact.hardness is not None and not self._pair.similar:
+            raise disagreement(
+                "the yield of dissimilar bodies is not computed; allowed: bodies of equal "
+                "(1 - 2ν)/G, both with the same layers, or no hardness",
+                *("contact.hardness", "materials"),
+            )
+        self._check_load_below_hardness()
         if isinstance(self.structure, Heights):
             require_shape(self.structure.file, self.contact.centred().shape)
         check_surfaces(self.structure, self.contact.centred())
         return self
+
+    def _check_load_below_hardness(self) -> None:
+        """Refuse a load that the whole grid cannot carry at the hardness."""
+        grid, table = self.contact.centred(), self.load_path.table()
+        if self.contact.hardness is None or "P" not in table.columns:
+            return
+        most = self.contact.hardness * grid.cell_area * grid.shape[0] * grid.shape[1]
+        if (largest := float(table["P"].max())) >= most:
+            raise disagreement(
+                f"{plain(self.contact.hardness, 'MPa')}: the whole grid carries {most:.4g} N at "
+                f"it, and P is up to {largest:.4g} N; allowed: a larger hardness, or grid",
+                "contact.hardness",
+            )
 
     def _check_periodic(self) -> None:
         """Refuse loads and bodies that a patch and its neighbours cannot have alike."""
@@ -453,6 +479,8 @@ class BodiesCase(Case):
             kind, cells = "line contact", f"{nx} cells of {plain(dx, 'mm', 4)}"
         count = f"{len(table)} increment{'s' if len(table) > 1 else ''}"
         repeated = ", repeated without end" if self.contact.periodic else ""
+        hardness = self.contact.hardness
+        yields = f", hardness {plain(hardness, 'MPa')}" if hardness is not None else ""
         return [
             ("structure", f"{self.structure.text}, {kind}"),
             ("load path", f"{count} of {', '.join(table.columns)}"),
@@ -461,7 +489,7 @@ class BodiesCase(Case):
             *of_bodies("material", self.materials),
             *layers_in_words(self.materials),
             ("friction", f"{self.friction.coefficient:g}" if self.friction.coefficient else "none"),
-            ("contact", f"{cells}{repeated}, history {self.contact.history}"),
+            ("contact", f"{cells}{repeated}{yields}, history {self.contact.history}"),
         ]
 
     def plausibility_warnings(self) -> Iterator[Notice]:

@@ -76,6 +76,7 @@ def _march(
                 case.friction.coefficient,
                 history=case.contact.history,
                 tolerance=case.contact.tolerance,
+                hardness=case.contact.hardness,
                 accuracy=case.contact.accuracy,
                 progress=keep,
             )

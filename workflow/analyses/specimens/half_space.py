@@ -27,7 +27,8 @@ from fe_models.joints.reduced_contact import NormalSolution, ReducedPair, X, Z
 from fe_models.meshes.structure_mesh import Face
 from fe_models.meshes.transfer import FaceTransfer
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.normal.contact import NormalContact, NormalState
+from sa_solver.normal.contact import NormalContact
+from sa_solver.normal.state import NormalState
 from sa_solver.tangential.contact import TangentialContact, TangentialState
 from sa_solver.types import Array, ElasticPair, Grid, Indices
 from wear.contact.link import StructureLink, fitted

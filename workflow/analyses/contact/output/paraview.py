@@ -50,6 +50,9 @@ def write_contact(contents: ContactContents, file: h5py.File, folder: Path) -> l
 def _faces(file: h5py.File, folder: Path) -> Iterator[Step]:
     points = FacePoints(grid_of(file["grid"][BODIES]), frame_of(file["grid"][BODIES]))
     for name, state in file["contact"][BODIES].items():
-        fields = traction_fields(state, points) | {"gap": (points.of(state["gap"]), "mm")}
+        distances = [field for field in ("gap", "flattening") if field in state]
+        fields = traction_fields(state, points) | {
+            field: (points.of(state[field]), "mm") for field in distances
+        }
         path = folder / "contact" / f"{name}.vtp"
         yield float(state.attrs["increment"]), BODIES, path, points.mesh(fields)

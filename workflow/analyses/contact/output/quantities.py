@@ -28,6 +28,9 @@ NUMBERS = {
     "peak_shear": NumberOf("MPa", "largest shear", leading=True),
     "stick_radius": NumberOf("mm", "stick radius (of a disk of equal area)", leading=True),
     "stick_half_width": NumberOf("mm", "stick half width", leading=True),
+    "flattening": NumberOf("mm", "largest depth by which the surfaces have yielded"),
+    "flattened_volume": NumberOf("mm^3", "volume displaced by yield (not worn)"),
+    "flattened_area": NumberOf("mm^2", "area that has yielded"),
     "cumulative_energy": NumberOf("N mm", "energy dissipated so far"),
 }
 # Forces and motions below this share of the largest are rounding.

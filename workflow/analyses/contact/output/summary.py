@@ -41,6 +41,7 @@ def state_summaries(grid: Grid, friction: float, history: History) -> list[dict[
             **dict(zip(MOTIONS, map(float, state.rigid), strict=True)),
             **_pressure_summary(grid, state),
             **_shear_summary(grid, friction, state),
+            **_yield_summary(grid, state),
             "energy": float(np.sum(state.energy)),
             "cumulative_energy": float(energy),
             "sliding": slides(state, friction),
@@ -130,6 +131,17 @@ def _shear_summary(grid: Grid, friction: float, state: ContactState) -> dict[str
     moment = friction * np.sum(pressure * radius) * grid.cell_area
     share = float(radial.max() / shear.max()) if shear.any() else 0.0
     return numbers | {"radial_shear_share": share, "full_slip_moment": float(moment)}
+
+
+def _yield_summary(grid: Grid, state: ContactState) -> dict[str, float]:
+    """Return by how much the surfaces have yielded, for bodies with a hardness."""
+    if state.flattening is None:
+        return {}
+    return {
+        "flattening": float(state.flattening.max()),
+        "flattened_volume": float(state.flattening.sum()) * grid.cell_area,
+        "flattened_area": float(np.count_nonzero(state.flattening)) * grid.cell_area,
+    }
 
 
 def _extent(grid: Grid, cells: Mask, name: str) -> dict[str, float]:
