@@ -87,8 +87,10 @@ def python(folder: Path, *arguments: str, cwd: Path | None = None) -> str:
 
 def install(folder: Path, *what: str) -> None:
     """Install packages in the versions that everything is tested with."""
-    quietly = ("-q", "--disable-pip-version-check", "-c", str(ROOT / "constraints.txt"))
-    python(folder, "-m", "pip", "install", *quietly, *what)
+    # Most of what is installed is never imported here.
+    quietly = ("-q", "--disable-pip-version-check", "--no-compile")
+    versions = ("-c", str(ROOT / "constraints.txt"))
+    python(folder, "-m", "pip", "install", *quietly, *versions, *what)
 
 
 def found(version: str) -> str | None:

@@ -42,8 +42,8 @@ VIBRATION = (
 title: Slider that shakes
 analysis: vibration
 joint: {law: jenkins, normal_load: 60 N, friction: 0.88, stiffness: 45 N/um}
-forces: [5 N, 30 N]
-frequencies: [60 Hz, 300 Hz]
+forces: [20 N, 30 N]
+frequencies: [100 Hz, 160 Hz]
 resolution: {tolerance: 5 %}
 backbone: true
 force_sweeps: [120 Hz]
@@ -74,7 +74,7 @@ RECORD = "time [s], force [N]\n" + "".join(
     f"{1e-3 * n:.3f}, {60.0 * np.sin(0.5 * n) * np.sin(0.07 * n):.6f}\n" for n in range(600)
 )
 RUNS = {
-    "specimens": LongRun(SMALL, ("wear.energy=3 kJ",)),
+    "specimens": LongRun(SMALL, ("wear.energy=1.2 kJ", "load_path.normal_forces=[87 N]")),
     "joint": LongRun(JOINT, ("energies=[0.2 J, 0.5 J]", "ageing.tolerance=1e-9")),
     "steady": LongRun(RIG_IN_TIME, (IN_A_ROW, "ageing.energy=20 J", "integration.step=20 us")),
     "hammer": LongRun(
@@ -87,15 +87,24 @@ RUNS = {
     ),
     "vibration": LongRun(VIBRATION),
     "half-space wear": LongRun(
-        WEARING_RIG, ("forces=[40 N]", "frequencies=[100 Hz, 250 Hz]"), (("wear.yaml", BALL),)
+        WEARING_RIG, ("forces=[40 N]", "frequencies=[150 Hz, 200 Hz]"), (("wear.yaml", BALL),)
     ),
     # Probe runs are computed in a worker process, which runs in tests do without.
     "wear": LongRun(
         BALL,
-        ("wear.step={kind: implicit, cycles: 100}", "contact.grid=[48, 48]", "error_budget=known"),
+        ("wear.step={kind: implicit, cycles: 400}", "contact.grid=[24, 24]", "error_budget=known"),
     ),
     "body wear": LongRun(
-        BODY, (IN_TEXT, "wear.frequency=", "wear.at_resonance=true", "wear.force=20 N"), as_texts()
+        BODY,
+        (
+            IN_TEXT,
+            "wear.frequency=",
+            "wear.at_resonance=true",
+            "wear.force=20 N",
+            "wear.cycles=[2e5]",
+            "frequencies=[400 Hz, 600 Hz]",
+        ),
+        as_texts(),
     ),
     "pad wear": LongRun(PADS_THAT_WEAR, ("forces=[20 N]",), (("specimens.yaml", SPECIMENS),)),
 }
