@@ -26,7 +26,7 @@ from workflow.kinds import load_case, parse_case
 # Seconds of a processor after which a check is taken for endless.
 ENDLESS = 60.0
 # Numbers of mutants in a test; tests of the quick part, and of all.
-BLOCK, QUICK, ALL = 50, 2, 50
+BLOCK, QUICK, ALL = 50, 2, 20
 # What a line may be long, of any text that somebody may write.
 LONGEST = 600
 
