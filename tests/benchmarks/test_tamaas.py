@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable
 from statistics import median
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ import pytest
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
 from sa_solver.normal.problem import contact_residuals
+from sa_solver.normal.state import NormalState
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.transforms import passes as loops
 from sa_solver.types import Array, ElasticPair, Grid, Material
@@ -130,22 +132,33 @@ def test_convolutions_hardly_grow_with_the_grid(record: dict[str, float]) -> Non
     assert max(counts) <= 1.5 * counts[0]
 
 
-def test_a_periodic_rough_patch_has_the_contact_of_tamaas() -> None:
-    """Both have the same discrete problem: cells in contact are equal, pressures to 1e-6."""
-    tm = pytest.importorskip("tamaas", reason="pip install tamaas")
-    cells, mean = 128, 0.02 * PAIR.contact_modulus
+def rough_patch(cells: int) -> tuple[Grid, Array]:
+    """Return a periodic rough surface with waves of 4 cells and more, and a slope of 0.2."""
     along = np.fft.fftfreq(cells, 1 / cells)[:, None], np.fft.rfftfreq(cells, 1 / cells)
     wave_number = np.hypot(*along)
     size = np.where((wave_number >= 2) & (wave_number <= 32), np.maximum(wave_number, 1) ** -1.8, 0)
     phase = np.exp(2j * np.pi * np.random.default_rng(1).random(wave_number.shape))
     height = np.fft.irfft2(size * phase, s=(cells, cells))
     grid = Grid.covering((1.0, 1.0), (cells, cells))
-    height *= 0.2 / np.hypot(*np.gradient(height, *grid.pitch)).std()
-    ours = NormalContact(HalfSpace(grid, PAIR, periodic=True)).solve(height, mean, tolerance=1e-9)
+    return grid, 0.2 * height / np.hypot(*np.gradient(height, *grid.pitch)).std()
+
+
+def periodic_model(grid: Grid, modulus: float) -> Any:
+    """Return Tamaas's model of a periodic half-space with the contact ``modulus``."""
+    tm = pytest.importorskip("tamaas", reason="pip install tamaas")
     tm.initialize(1)
     tm.set_log_level(tm.LogLevel.error)
     model = tm.ModelFactory.createModel(tm.model_type.basic_2d, list(grid.size), list(grid.shape))
-    model.E, model.nu = PAIR.contact_modulus, 0.0
+    model.E, model.nu = modulus, 0.0
+    return model
+
+
+def test_a_periodic_rough_patch_has_the_contact_of_tamaas() -> None:
+    """Both have the same discrete problem: cells in contact are equal, pressures to 1e-6."""
+    tm = pytest.importorskip("tamaas", reason="pip install tamaas")
+    (grid, height), mean = rough_patch(128), 0.02 * PAIR.contact_modulus
+    ours = NormalContact(HalfSpace(grid, PAIR, periodic=True)).solve(height, mean, tolerance=1e-9)
+    model = periodic_model(grid, PAIR.contact_modulus)
     solver = tm.PolonskyKeerRey(model, -height, 1e-13)
     solver.max_iter = 5000
     solver.solve(mean)
@@ -153,3 +166,31 @@ def test_a_periodic_rough_patch_has_the_contact_of_tamaas() -> None:
     assert 0.05 < (theirs > 0.0).mean() < 0.9
     assert np.count_nonzero((theirs > 0.0) != (ours.pressure > 0.0)) <= 1
     np.testing.assert_allclose(ours.pressure, theirs, atol=1e-6 * theirs.max())
+
+
+@pytest.mark.parametrize("hardness", [0.17, 0.035])
+def test_a_rough_patch_that_yields_is_that_of_tamaas(
+    hardness: float, record: dict[str, float]
+) -> None:
+    """The same cells touch and yield, pressures to 1e-6; the hardness is over E*.
+
+    Tamaas bounds the pressure by projected steps, which need a modulus of 1.
+    """
+    tm = pytest.importorskip("tamaas", reason="pip install tamaas")
+    (grid, height), mean = rough_patch(128), 0.02
+    limit = hardness * PAIR.contact_modulus
+    contact = NormalContact(HalfSpace(grid, PAIR, periodic=True))
+
+    def solve() -> NormalState:
+        return contact.solve(height, mean * PAIR.contact_modulus, hardness=limit, tolerance=1e-9)
+
+    model = periodic_model(grid, 1.0)
+    solver = tm.KatoSaturated(model, -height, 1e-12, hardness)
+    solver.max_iter = 2000
+    their_time = seconds(lambda: solver.solve(mean), 1)
+    ours, ratio = solve(), their_time / seconds(solve, 3)
+    theirs = np.array(model.traction) * PAIR.contact_modulus
+    np.testing.assert_array_equal(theirs > 1e-6 * limit, ours.pressure > 0.0)
+    np.testing.assert_array_equal(theirs > (1.0 - 1e-6) * limit, ours.flattening > 0.0)
+    np.testing.assert_allclose(ours.pressure, theirs, atol=1e-6 * limit)
+    record[f"rough, 128², hardness {hardness:g} E*: Tamaas's time over ours"] = ratio
