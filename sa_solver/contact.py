@@ -98,7 +98,7 @@ class FrictionalContact:
                     "the yield of dissimilar bodies is not computed: give no hardness, or bodies "
                     "of equal (1 - 2ν)/G"
                 )
-        self._hardness = hardness
+        self.hardness = hardness
 
     def unloaded_state(self, height: Array, along: Array | None = None) -> ContactState:
         """Return the state of the unloaded bodies, with the gap ``height`` ``(nx, ny)`` [mm].
@@ -120,7 +120,7 @@ class FrictionalContact:
             converged=True,
             cell_area=self.grid.cell_area,
             along=along,
-            flattening=None if self._hardness is None else np.zeros(self.grid.shape),
+            flattening=None if self.hardness is None else np.zeros(self.grid.shape),
         )
 
     def advance(
@@ -224,7 +224,7 @@ class FrictionalContact:
             tilt_y=tilt_y,
             tolerance=self.tolerance,
             start=start,
-            hardness=self._hardness,
+            hardness=self.hardness,
         )
 
     def _shear(

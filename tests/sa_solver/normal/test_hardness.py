@@ -15,6 +15,7 @@ from sa_solver import (
     Material,
     NormalContact,
     march_history,
+    steady_rolling,
 )
 from sa_solver.normal.control import NormalContactError
 
@@ -133,3 +134,6 @@ def test_nonsense_is_refused():
     coated = Material(210e3, 0.3, layers=[Layer(0.1, 20e3, 0.3)])
     with pytest.raises(InputError, match="dissimilar"):
         FrictionalContact(HalfSpace(GRID, ElasticPair(STEEL, coated)), 0.3, hardness=1e3)
+    contact = FrictionalContact(HalfSpace(GRID, ElasticPair(STEEL, STEEL)), 0.3, hardness=1e3)
+    with pytest.raises(InputError, match="roll"):
+        steady_rolling(contact, BALL, P=LOAD)
