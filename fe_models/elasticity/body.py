@@ -23,6 +23,7 @@ from skfem.helpers import grad
 from fe_models.meshes.halving import moments_on_halves
 from fe_models.meshes.isoparametric import INTEGRATED, facet_normals, mapping_of
 from fe_models.meshes.structure_mesh import Body, in_space, mesh_edges
+from sa_solver.errors import InputError
 from sa_solver.half_space.stress import principal_stresses
 from sa_solver.half_space.subsurface_influence import INDICES
 from sa_solver.types import Array, Indices, Material
@@ -83,6 +84,10 @@ class ElasticBody:
         self.order = order
         if body.elements is not None and order != 2:
             raise ValueError(f"{body.name} has elements of second order, not of order {order}")
+        if material.layers:
+            raise InputError(
+                f"{body.name} has layers, which its elements leave out: give its own material alone"
+            )
         self.dimension = body.mesh.dim()
         self.node_order = order if body.elements is None else 1
         self.curved = self.node_order == 2 and body.midsides is not None

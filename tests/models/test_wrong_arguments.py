@@ -5,12 +5,13 @@ from dataclasses import replace
 import fretscale
 import numpy as np
 import pytest
+from skfem import MeshTet
 
-from fe_models import FrettingConditions
+from fe_models import Body, ElasticBody, FrettingConditions
 from fe_models.dynamics import HarmonicForce, Link, Resolution, TimeStepControl, lumped_rig
 from fe_models.geometry import Specimen
-from sa_solver import LoadHistory, Material
-from wear import EnergyLaw
+from sa_solver import ElasticPair, Grid, InputError, Layer, LoadHistory, Material
+from wear import CellNodes, EnergyLaw, ImplicitStepper, InterfaceSettings
 from wear.joints import Jenkins, JointEvolution
 from workflow.models.loops import TangentialLoops
 
@@ -302,3 +303,27 @@ def test_resultants_are_numbers():
         wrong = LoadHistory(**vars(history()) | {name: [50.0, np.nan]})
         with pytest.raises(fretscale.FretscaleError, match="NaN"):
             fretscale.GivenLoads([(pad(), wrong)])
+
+
+def test_layers_are_refused_where_they_would_be_left_out():
+    coated = replace(STEEL, layers=(Layer(0.05, 20e3, 0.3),))
+    with pytest.raises(InputError, match="layers"):
+        fretscale.Contact((24, 24), (STEEL, coated), (LAW, LAW), friction=0.6)
+    with pytest.raises(InputError, match="layers"):
+        contact_of_settings(coated)
+    with pytest.raises(InputError, match="layers"):
+        ElasticBody(Body("cube", MeshTet()), coated)
+
+
+def contact_of_settings(body):
+    grid = Grid.line_contact(1.4, 70)
+    return InterfaceSettings(
+        name="cylinder",
+        grid=grid,
+        gap=grid.x**2 / 20.0,
+        transfer=CellNodes(grid),
+        pair=ElasticPair(STEEL, body),
+        laws=(LAW, LAW),
+        friction=lambda energy: 0.5,
+        stepper=ImplicitStepper(),
+    )

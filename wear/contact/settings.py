@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.normal.contact import checked_heights
 from sa_solver.types import Array, ElasticPair, Grid
 from wear.contact.drive import Drive
@@ -104,3 +105,7 @@ class InterfaceSettings:
         checks.settle(self, gap=checked_heights(self.gap, self.grid))
         checks.choice("method", self.method, ("normal", "full"))
         checks.choice("link", self.link, ("corrected", "half_space"))
+        if self.pair.layered:
+            raise InputError(
+                f"bodies of {self.name} have layers, which do not wear: leave them out"
+            )

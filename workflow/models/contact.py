@@ -228,12 +228,15 @@ class Wear:
 
 
 def check_two_bodies(bodies: object) -> None:
-    """Raise InputError unless ``bodies`` are two materials."""
+    """Raise InputError unless ``bodies`` are two materials without layers."""
     if not _are_two(bodies, lambda body: isinstance(body, Material)):
         raise InputError(
             f"bodies are {checks.shown(bodies)}: give two, the Material of body 1 and that of "
             "body 2"
         )
+    given: Any = bodies
+    if any(body.layers for body in given):
+        raise InputError("bodies have layers, which do not wear: leave them out")
 
 
 def check_two_laws(laws: object) -> None:
