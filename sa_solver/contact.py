@@ -38,6 +38,9 @@ from sa_solver.tangential.contact import (
 from sa_solver.tangential.gross_slip import SlidingRule, gross_slip, slides, sliding_direction
 from sa_solver.types import Array, Mask
 
+FrictionFactor = Callable[[Array], Array]
+"""Function from the pressure to the factors of the coefficient of friction, both ``(nx, ny)``."""
+
 TURNING = (3, 4, 5)
 """Indices of Mx, My and Mz among the six resultants, and of their motions."""
 
@@ -77,13 +80,17 @@ class FrictionalContact:
         tolerance: float = 1e-8,
         sliding: SlidingRule = "force",
         hardness: float | None = None,
+        factor: FrictionFactor | None = None,
     ) -> None:
         """Prepare the solvers for ``half_space`` and Coulomb's coefficient ``friction`` µ.
 
         ``sliding`` selects how the direction of gross slip is found: see
         :mod:`sa_solver.tangential.gross_slip`. The ``hardness`` [MPa] bounds the pressure of
-        similar bodies: see :mod:`sa_solver.normal.hardness`. Raises FrictionError unless µ is
-        finite and >= 0, and InputError for a hardness of dissimilar bodies.
+        similar bodies: see :mod:`sa_solver.normal.hardness`. Where friction depends on the place or
+        the pressure, ``factor`` returns the factors of µ ``(nx, ny)`` for a pressure ``(nx, ny)``.
+
+        Raises FrictionError unless µ is finite and >= 0, and InputError for a hardness or a factor
+        of dissimilar bodies.
         """
         friction = checks.number("friction", friction, least=0.0, error=FrictionError)
         tolerance = checks.number("tolerance", tolerance, above=0.0)
@@ -98,7 +105,27 @@ class FrictionalContact:
                     "the yield of dissimilar bodies is not computed: give no hardness, or bodies "
                     "of equal (1 - 2ν)/G"
                 )
-        self.hardness = hardness
+        if factor is not None and not half_space.pair.similar:
+            raise InputError(
+                "friction that depends on place or pressure is not computed for dissimilar bodies: "
+                "give one coefficient, or bodies of equal (1 - 2ν)/G"
+            )
+        self.hardness, self.factor = hardness, factor
+
+    def limit(self, pressure: Array) -> Array:
+        """Return the largest shear µp ``(nx, ny)`` [MPa] under a ``pressure`` [MPa].
+
+        Raises FrictionError for factors that are negative, not finite or of another shape.
+        """
+        limit = self.friction * pressure
+        if self.factor is None:
+            return limit
+        factors = checks.array(
+            "factors of friction", self.factor(pressure), self.grid.shape, error=FrictionError
+        )
+        if factors.min() < 0.0:
+            raise FrictionError(f"a factor of friction is {factors.min():g}: give 0 or more")
+        return np.asarray(limit * factors)
 
     def unloaded_state(self, height: Array, along: Array | None = None) -> ContactState:
         """Return the state of the unloaded bodies, with the gap ``height`` ``(nx, ny)`` [mm].
@@ -145,7 +172,11 @@ class FrictionalContact:
         if before.flattening is not None:
             height = height + before.flattening
         normal = self._press(before, height, load, guess.normal)
-        limit = self.friction * normal.pressure
+        if self.factor is not None and load.energy is not None:
+            raise InputError(
+                "sliding by energy needs one coefficient of friction: give no factor, or no energy"
+            )
+        limit = self.limit(normal.pressure)
         offset, area = self.offset(before, load), self.grid.cell_area
         sliding = slides(limit, load, self._modes, self.grid.cell_area)
         if sliding:
@@ -166,13 +197,13 @@ class FrictionalContact:
     def two_normal_problems(self, before: ContactState, load: ContactLoad) -> bool:
         """Return whether two normal problems give the shear: first loading of a line contact.
 
-        Layers do not resist shear as they resist pressure.
+        They need one coefficient, and bodies that resist shear as pressure: layers do not.
         """
         along_x = load.values[1] != 0.0 and load.values[2] == 0.0
         by_force = not any(load.motion[k] for k in (0, 1, 2, 4))
         moved = load.along is not None or before.along is not None
         fresh = not before.shear.any() and load.strain == before.strain and not moved
-        alike = self.grid.line and not self.half_space.pair.layered
+        alike = self.grid.line and not self.half_space.pair.layered and self.factor is None
         return alike and self.friction > 0.0 and along_x and by_force and fresh
 
     def offset(self, before: ContactState, load: ContactLoad) -> Array:
@@ -348,7 +379,7 @@ class FrictionalContact:
         sliding: bool,
     ) -> ContactState:
 
-        flattening = before.flattening
+        limit, flattening = self.limit(normal.pressure), before.flattening
         if flattening is not None and normal.flattening is not None:
             flattening = flattening + normal.flattening
         rigid = np.array([normal.approach, 0.0, 0.0, normal.tilt_x, normal.tilt_y, 0.0])
@@ -366,7 +397,7 @@ class FrictionalContact:
             rigid=rigid,
             strain=load.strain,
             along=load.along,
-            energy=self._dissipated(before, self.friction * normal.pressure, tangential.slip),
+            energy=self._dissipated(before, limit, tangential.slip),
             sliding=sliding,
             residual=max(normal.residuals.largest, tangential.residuals.largest),
             converged=normal.converged and tangential.converged,
@@ -375,6 +406,7 @@ class FrictionalContact:
             border_load=normal.border_load,
             cell_area=self.grid.cell_area,
             flattening=flattening,
+            limit=None if self.factor is None else limit,
         )
 
     def _slip(
@@ -404,7 +436,7 @@ class FrictionalContact:
 
     def _dissipated(self, before: ContactState, limit: Array, slip: Array) -> Array:
         """Return the energy (2,) [N mm] dissipated along x and y; ``limit`` is µp at the end."""
-        mean = 0.5 * (self.friction * before.pressure + limit)
+        mean = 0.5 * (self.limit(before.pressure) + limit)
         work = dissipated(mean.ravel(), slip.reshape(2, -1))
         return np.asarray(work.sum(axis=1) * self.grid.cell_area)
 

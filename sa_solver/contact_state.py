@@ -212,6 +212,8 @@ class ContactState(TractionState):
         Share of P that the outermost cells carry; above 0 the grid is too small.
     flattening
         Depth ``(nx, ny)`` [mm] by which the surfaces have yielded so far, None without a hardness.
+    limit
+        Largest shear µp ``(nx, ny)`` [MPa] where friction depends on place or pressure, else None.
     """
 
     traction: Array
@@ -232,6 +234,7 @@ class ContactState(TractionState):
     convolutions: int = 0
     border_load: float = 0.0
     flattening: Array | None = None
+    limit: Array | None = None
 
     @property
     def slipping(self) -> Mask:

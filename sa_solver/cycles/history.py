@@ -26,7 +26,7 @@ from typing import Literal
 import numpy as np
 
 from sa_solver import checks
-from sa_solver.contact import FrictionalContact
+from sa_solver.contact import FrictionalContact, FrictionFactor
 from sa_solver.contact_state import ContactLoad, ContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
@@ -185,6 +185,7 @@ def march_history(
     accuracy: float = ACCURACY,
     tolerance: float = 1e-8,
     hardness: float | None = None,
+    factor: FrictionFactor | None = None,
     progress: Progress = lambda row, state, share: None,
 ) -> History:
     """Solve a loading history on surfaces that do not wear.
@@ -211,6 +212,8 @@ def march_history(
         Tolerance of the contact problems.
     hardness
         Largest pressure [MPa] before similar bodies yield: :mod:`sa_solver.normal.hardness`.
+    factor
+        Factor of µ as a function of the pressure, for similar bodies: :class:`FrictionalContact`.
     progress
         Callback that receives the row, its state and the approximate share of the work done; rows
         are repeated when increments are split.
@@ -245,7 +248,7 @@ def march_history(
     >>> print(f"{error:.1f} of {np.abs(exact).max():.1f} MPa")
     2.8 of 146.2 MPa
     """
-    contact = FrictionalContact(half_space, friction, tolerance, hardness=hardness)
+    contact = FrictionalContact(half_space, friction, tolerance, hardness=hardness, factor=factor)
     checks.choice("history", history, ("auto", "full", "reversals"), HistoryError)
     accuracy = checks.number("accuracy", accuracy, above=0.0, error=HistoryError)
     obstacle = _obstacle_to_legs(half_space, path)
@@ -448,7 +451,8 @@ def _reversals(
         contact, height, legs, lambda leg, state, share: progress(rows[leg], state, share)
     )
     pair = contact.half_space.pair
-    keeps_direction = not pair.layered and (contact.grid.line or pair.poisson == 0.0)
+    plain = not pair.layered and contact.factor is None
+    keeps_direction = plain and (contact.grid.line or pair.poisson == 0.0)
     exact = keeps_direction and _proportional(path.shear)
     reason = "similar bodies, pressure constant while the shear load turns"
     parts = 1 if exact or len(rows) == 1 else PARTS_OF_LEGS

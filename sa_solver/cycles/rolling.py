@@ -106,8 +106,8 @@ def steady_rolling(
     Raises
     ------
     InputError
-        If both of a pair are given, a spin on a line grid, a contact with a hardness, or if the
-        contact reaches the border of the grid.
+        If both of a pair are given, a spin on a line grid, a contact with a hardness or a factor
+        of friction, or if it reaches the border of the grid.
     RollingError
         If a contact problem does not converge, or the contact is not steady after 20 of its
         lengths. The exceptions of :meth:`FrictionalContact.advance` may be raised as well.
@@ -130,8 +130,10 @@ def steady_rolling(
     """
     checks.number("P", P, above=0.0)
     tolerance = checks.number("tolerance", tolerance, above=0.0)
-    if contact.hardness is not None:
-        raise InputError("yield of surfaces that roll is not computed: give no hardness")
+    if contact.hardness is not None or contact.factor is not None:
+        raise InputError(
+            "surfaces that roll have no hardness and one coefficient of friction: give no factor"
+        )
     rates = {"creepage_x": creepage_x, "creepage_y": creepage_y, "spin": spin}
     pitch = contact.grid.pitch[0]
     step = _one_cell(P, pitch, rates, {"Qx": Qx, "Qy": Qy, "Mz": Mz})

@@ -186,6 +186,7 @@ GIVEN |= {
 LAYERS = [{"thickness": "50 um", "young": "50 GPa", "poisson": 0.3}]
 for kind in FLATS:
     GIVEN[kind]["materials.body_1.layers"] = {ALWAYS: LAYERS}
+    GIVEN[kind]["friction.by_pressure"] = {ALWAYS: {"pressure": [0, 1000], "factor": [1, 0.6]}}
 # Cases in time: other joints, factors of their parameters, and other excitations.
 JOINT = {"normal_load": 60, "friction": 0.1, "stiffness": 1e4}
 JOINTS = {law: {"law": law, **JOINT} for law in ("jenkins", "uniform_iwan", "four_parameter_iwan")}

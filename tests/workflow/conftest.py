@@ -326,6 +326,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
         made[kind] = tmp_path_factory.mktemp(kind)
         shutil.copytree(template_files, made[kind], dirs_exist_ok=True)
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
+        np.save(made[kind] / "factors.npy", np.ones(CELLS.get(kind, (0, 0))))
         # A scan of more than the size of the template's grid, or a profile.
         np.save(made[kind] / "disk.npy", np.zeros((600, 1 if "line" in kind else 600)))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")

@@ -53,6 +53,22 @@ WRONG = [
     (BALL, "size: [1 mm, 1 mm]", "size: [1 mm, 1 mm], hardness: 0 MPa", "contact.hardness"),
     (BALL, "size: [1 mm, 1 mm]", "size: [1 mm, 1 mm], hardness: 300 MPa", "contact.hardness"),
     (COATED, "size: [1 mm, 1 mm]", "size: [1 mm, 1 mm], hardness: 1 GPa", "contact.hardness"),
+    (BALL, "coefficient: 0.7", "coefficient: 0.7, field: none.npy", "friction.field"),
+    (
+        *(BALL, "coefficient: 0.7"),
+        "coefficient: 0.7, by_pressure: {pressure: [1 GPa, 0 MPa], factor: [1, 2]}",
+        "friction.by_pressure.pressure",
+    ),
+    (
+        *(BALL, "coefficient: 0.7"),
+        "coefficient: 0.7, by_pressure: {pressure: [0 MPa], factor: [1, 2]}",
+        "friction.by_pressure.factor",
+    ),
+    (
+        *(COATED, "coefficient: 0.7"),
+        "coefficient: 0.7, by_pressure: {pressure: [0 MPa], factor: [1]}",
+        "friction",
+    ),
     (COATED, "thickness: 50 um", "thickness: -1 um", "materials.body_2.layers.0.thickness"),
     (COATED, "thickness: 50 um, ", "", "materials.body_2.layers.0.thickness"),
     (COATED, LAYER, "paint", "materials.body_2.layers.0"),

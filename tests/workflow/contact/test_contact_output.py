@@ -67,6 +67,7 @@ def state(shear, resultants, rigid, energy=0.0, grid=GRID, pressure=None):
         convolutions=20,
         border_load=0.0,
         flattening=None,
+        limit=None,
     )
 
 

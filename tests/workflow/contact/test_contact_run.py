@@ -78,6 +78,7 @@ def states(count, **last):
         "convolutions": 1,
         "border_load": 0.0,
         "flattening": None,
+        "limit": None,
     }
     return [SimpleNamespace(**(nothing | (last if k == count - 1 else {}))) for k in range(count)]
 
@@ -275,6 +276,29 @@ def test_a_periodic_patch_has_no_border(tmp_path):
     assert own["Qx"] == pytest.approx(210.0, rel=1e-7)
     for quantity in ("peak_pressure", "approach", "shift_x", "contact_radius"):
         assert own[quantity] == pytest.approx(moved[quantity], rel=1e-5)
+
+
+def test_friction_by_place_and_pressure_bounds_the_shear(tmp_path):
+    factors = np.where(np.arange(32)[:, None] < 16, 0.5, 1.0) * np.ones((1, 32))
+    np.save(tmp_path / "factors.npy", factors)
+    case = tmp_path / "case.yaml"
+    table = "by_pressure: {pressure: [0 MPa, 2 GPa], factor: [1, 0.5]}"
+    varied = SMALL.replace("coefficient: 0.7", f"coefficient: 0.7, field: factors.npy, {table}")
+    case.write_text(varied.replace("210 N", "120 N"), encoding="utf-8")
+    assert varied != SMALL
+    assert invoke("run", case, "--out", tmp_path / "out").exit_code == 0
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        fields = list(file["contact/bodies"].values())[-1]
+        pressure, limit = fields["pressure"][()], fields["limit"][()]
+        shear = np.hypot(*fields["shear"][()])
+    expected = 0.7 * factors * pressure * np.interp(pressure, [0.0, 2000.0], [1.0, 0.5])
+    assert limit == pytest.approx(expected, rel=1e-12)
+    assert (shear <= limit * (1.0 + 1e-7) + 1e-9).all()
+    last = summary_of(tmp_path / "out")["states"][-1]
+    assert last["full_slip_force"] == pytest.approx(limit.sum() / 32**2)
+    assert last["Qx"] == pytest.approx(120.0, rel=1e-6)
+    np.save(tmp_path / "factors.npy", factors[:8])
+    assert "friction.field" in invoke("check", case).stderr
 
 
 def test_what_has_yielded_is_in_the_results(tmp_path):

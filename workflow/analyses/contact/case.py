@@ -18,6 +18,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from sa_solver.surfaces import shapes
 from sa_solver.types import Array, ElasticPair, Grid, Layer
 from sa_solver.types import Material as ElasticMaterial
+from workflow.analyses.contact.friction import FrictionByPlace
 from workflow.analyses.contact.load_path import ContactPath, LegsOrFile, LineContactPath
 from workflow.analyses.contact.plausibility import (
     about_grid,
@@ -33,7 +34,6 @@ from workflow.case.plausibility import heights, hertz, uneven_cells
 from workflow.case.sections import (
     Case,
     ElasticSection,
-    Friction,
     GridCells,
     Length,
     LineCells,
@@ -396,9 +396,9 @@ class BodiesCase(Case):
     analysis: Literal["contact"] = entry("kind of analysis", "contact")
     structure: Bodies
     materials: LayeredMaterials = entry("the two bodies in contact")
-    friction: Friction = entry(
+    friction: FrictionByPlace = entry(
         "Coulomb's law; not needed if similar bodies are only pressed",
-        default=Friction(coefficient=0.0),
+        default=FrictionByPlace(coefficient=0.0),
     )
     load_path: LegsOrFile
     contact: HalfSpaceGrid
@@ -426,6 +426,13 @@ class BodiesCase(Case):
                 *("contact.hardness", "materials"),
             )
         self._check_load_below_hardness()
+        if self.friction.varies and not self._pair.similar:
+            raise disagreement(
+                "friction that depends on place or pressure is not computed for dissimilar bodies; "
+                "allowed: bodies of equal (1 - 2ν)/G, or one coefficient",
+                *("friction", "materials"),
+            )
+        self.friction.check_field(self.contact.centred().shape)
         if isinstance(self.structure, Heights):
             require_shape(self.structure.file, self.contact.centred().shape)
         check_surfaces(self.structure, self.contact.centred())
@@ -488,7 +495,7 @@ class BodiesCase(Case):
             *surfaces_in_words(self.structure, grid),
             *of_bodies("material", self.materials),
             *layers_in_words(self.materials),
-            ("friction", f"{self.friction.coefficient:g}" if self.friction.coefficient else "none"),
+            ("friction", self.friction.text),
             ("contact", f"{cells}{repeated}{yields}, history {self.contact.history}"),
         ]
 
@@ -511,7 +518,8 @@ class BodiesCase(Case):
         if self.contact.periodic:
             yield from about_repetition(self.structure.gap_on(grid))
         unit = "N/mm" if grid.line else "N"
-        yield from about_shear("load_path", table, self.friction.coefficient, unit)
+        if not self.friction.varies:
+            yield from about_shear("load_path", table, self.friction.coefficient, unit)
 
 
 class ContactCase(BodiesCase):

@@ -77,6 +77,7 @@ def _march(
                 history=case.contact.history,
                 tolerance=case.contact.tolerance,
                 hardness=case.contact.hardness,
+                factor=case.friction.factor(),
                 accuracy=case.contact.accuracy,
                 progress=keep,
             )

@@ -82,8 +82,10 @@ def profiles(file: h5py.File) -> Figure:
     place = "" if _grid(file).line else " at y = 0"
     axes[0].set(ylabel="pressure [MPa]", ylim=(0.0, None), title=f"pressure{place}")
     if sheared:
-        pressure = middle(_states(file)[last]["pressure"][()], 0)
-        limit = float(file.attrs["friction"]) * pressure
+        state = _states(file)[last]
+        known = state["limit"] if "limit" in state else state["pressure"]
+        factor = 1.0 if "limit" in state else float(file.attrs["friction"])
+        limit = factor * middle(known[()], 0)
         label = f"±µp in increment {_states(file)[last].attrs['increment']}"
         axes[1].fill_between(x, -limit, limit, color=SHADE, alpha=0.4, lw=0, label=label)
         component = "xy"[along]

@@ -69,6 +69,7 @@ history
 contact/{BODIES}/<increment>{ON_GRID}
     gap | mm | x y | distance of the deformed faces
     sticking | 1 | x y | whether the cell is pressed and its shear below µp
+    limit | MPa | x y | largest shear; only where friction depends on place or pressure
     flattening | mm | x y | depth by which the surfaces have yielded so far; only with a hardness
 """,
     x=f"grid/{BODIES}",

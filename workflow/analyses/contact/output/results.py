@@ -96,14 +96,15 @@ def _columns(history: History, friction: float) -> dict[str, Array]:
 
 def _fields(state: ContactState, friction: float) -> dict[str, Array | Mask]:
     """Return fields of the contact in one increment."""
-    yielded = {} if state.flattening is None else {"flattening": state.flattening}
+    known = {"limit": state.limit, "flattening": state.flattening}
+    others = {name: field for name, field in known.items() if field is not None}
     return {
         "pressure": state.traction[2],
         "shear": state.traction[:2],
         "slip": state.slip,
         "gap": state.gap,
         "sticking": stick_zone(state, friction),
-        **yielded,
+        **others,
     }
 
 

@@ -96,7 +96,12 @@ def stick_zone(state: ContactState, friction: float) -> Mask:
     """Return the mask ``(nx, ny)`` of cells that are pressed and whose shear is below µp."""
     pressure = state.traction[2]
     shear = np.hypot(*state.traction[:2])
-    return (pressure > 0.0) & (shear < friction * pressure * (1.0 - STICK_MARGIN))
+    return (pressure > 0.0) & (shear < _limit(state, friction) * (1.0 - STICK_MARGIN))
+
+
+def _limit(state: ContactState, friction: float) -> Array:
+    """Return the largest shear ``(nx, ny)`` [MPa]."""
+    return friction * state.traction[2] if state.limit is None else state.limit
 
 
 def slides(state: ContactState, friction: float) -> bool:
@@ -116,7 +121,8 @@ def _pressure_summary(grid: Grid, state: ContactState) -> dict[str, float]:
 
 
 def _shear_summary(grid: Grid, friction: float, state: ContactState) -> dict[str, Any]:
-    qx, qy, pressure = state.traction
+    qx, qy, _ = state.traction
+    limit = _limit(state, friction)
     shear, radius = np.hypot(qx, qy), np.hypot(grid.x, grid.y)
     sticks = stick_zone(state, friction)
     radial = np.abs(qx * grid.x + qy * grid.y) / np.where(radius > 0.0, radius, 1.0)
@@ -124,11 +130,11 @@ def _shear_summary(grid: Grid, friction: float, state: ContactState) -> dict[str
         "peak_shear": float(shear.max()),
         **_extent(grid, sticks, "stick"),
         "stick_centre": _centre(grid, sticks),
-        "full_slip_force": float(friction * pressure.sum() * grid.cell_area),
+        "full_slip_force": float(limit.sum() * grid.cell_area),
     }
     if grid.line:
         return numbers
-    moment = friction * np.sum(pressure * radius) * grid.cell_area
+    moment = np.sum(limit * radius) * grid.cell_area
     share = float(radial.max() / shear.max()) if shear.any() else 0.0
     return numbers | {"radial_shear_share": share, "full_slip_moment": float(moment)}
 
