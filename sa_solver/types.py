@@ -142,7 +142,7 @@ class Material:
         Coefficient of linear thermal expansion [1/K].
     layers
         Layers on the surface of the body, the outermost first. The other properties are those of
-        the body below them.
+        the body below them. Half-spaces have layers; finite elements and wear refuse them.
 
     Raises
     ------

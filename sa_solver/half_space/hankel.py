@@ -2,8 +2,9 @@
 
 A function on the plane that depends on the wave number k as f(k) cos nθ depends on the distance r
 as the integral of f(k) J_n(kr) dk, times cos nφ and a factor. The integrals are computed for all
-distances at once by fast transforms on a logarithmic scale: Hamilton 2000, doi:10.1046/
-j.1365-8711.2000.03071.x (FFTLog). That of exp(-k) is exact to 1e-13.
+distances at once by fast transforms on a logarithmic scale. That of exp(-k) is exact to 1e-13.
+
+Source: Hamilton 2000, doi:10.1046/j.1365-8711.2000.03071.x (FFTLog).
 """
 
 from __future__ import annotations

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array, ElasticPair, Layer, Material
 
 STEPS, LONGEST_STEP = 20, 2.0
@@ -81,8 +82,8 @@ class WaveStress:
 def wave_stress(body: Material, depth: float, wave_numbers: Array) -> WaveStress:
     """Return the stress at a ``depth`` [mm] of a ``body`` in z >= 0.
 
-    On an interface it is the stress above it. The body below the layers must not be rigid, if the
-    depth is there.
+    On an interface it is the stress above it. Raises InputError for a depth below the layers of a
+    rigid body.
     """
     above, material, below = split(body, depth)
     at_depth = found = body_compliances(below, wave_numbers)
@@ -109,7 +110,8 @@ def wave_stress(body: Material, depth: float, wave_numbers: Array) -> WaveStress
 def split(body: Material, depth: float) -> tuple[list[Layer], Material, Material]:
     """Return the layers above a ``depth`` [mm], the material there and the body below it.
 
-    A depth on an interface belongs to the layer above it.
+    A depth on an interface belongs to the layer above it. Raises InputError for a depth in a rigid
+    body.
     """
     above: list[Layer] = []
     for number, layer in enumerate(body.layers):
@@ -122,6 +124,10 @@ def split(body: Material, depth: float) -> tuple[list[Layer], Material, Material
             return above + parts, here, below
         above.append(layer)
         depth -= layer.thickness
+    if np.isinf(body.young):
+        raise InputError(
+            "the body below the layers is rigid, and its stress unknown: give a depth within them"
+        )
     below = replace(body, layers=())
     return [*above, Layer(depth, body.young, body.poisson)] if depth > 0.0 else above, body, below
 

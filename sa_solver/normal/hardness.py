@@ -45,13 +45,18 @@ def yielding_state(
     """Return the state of bodies of this ``hardness`` [MPa], with its flattening.
 
     ``height`` ``(nx, ny)`` [mm] may be infinite. Raises NormalContactError for a load that the
-    hardness cannot carry.
+    hardness cannot carry, and where all cells yield.
     """
-    grid = half_space.grid
-    _check_hardness(hardness, int(np.isfinite(height).sum()), control, grid)
+    grid, present = half_space.grid, np.isfinite(height)
+    _check_hardness(hardness, int(present.sum()), control, grid)
     yields = np.zeros(grid.shape, dtype=bool)
     convolutions = 0
     for _ in range(PASSES):
+        if yields[present].all():
+            raise NormalContactError(
+                f"all cells yield at the hardness of {hardness:g} MPa: enlarge the grid, or lower "
+                "the approach"
+            )
         carried = np.where(yields, hardness, 0.0)
         moved = half_space.normal(carried) if yields.any() else carried
         others = np.where(yields, np.inf, height + moved)

@@ -256,6 +256,14 @@ def test_the_jump_of_stress_at_an_interface():
     assert np.abs(above[0] - below[0]).max() > 5.0
 
 
+def test_a_rigid_body_below_layers_has_no_stress():
+    stress = SubsurfaceStress(GRIDS["line"], BODIES["on a rigid body"], 2)
+    traction = np.ones((3, 20, 1))
+    assert np.isfinite(stress.at_depth(traction, 0.05)).all()
+    with pytest.raises(InputError, match="rigid"):
+        stress.at_depth(traction, 0.06)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [

@@ -129,6 +129,8 @@ def test_nonsense_is_refused():
         contact_on().solve(BALL, P=LOAD, hardness=100.0)
     with pytest.raises(NormalContactError, match="hardness"):
         contact_on().solve(BALL, P=LOAD, hardness=-1.0)
+    with pytest.raises(NormalContactError, match="all cells yield"):
+        contact_on().solve(BALL, approach=1.0, hardness=100.0)
     with pytest.raises(NormalContactError, match="compliance"):
         contact_on().solve(BALL, P=LOAD, hardness=1e3, compliance=np.zeros(GRID.shape))
     coated = Material(210e3, 0.3, layers=[Layer(0.1, 20e3, 0.3)])
