@@ -512,7 +512,8 @@ class BodiesCase(Case):
         elif "P" in loads and (load := float(loads["P"].max())) > 0.0:
             bodies = self.materials.body_1, self.materials.body_2
             if found := unworn_contact(self.structure, bodies, load, grid.line):
-                yield from about_pressure("load_path", found[1], bodies)
+                if self.contact.hardness is None:
+                    yield from about_pressure("load_path", found[1], bodies)
                 yield from about_grid(found[0], sides, grid.shape)
         yield from surface_warnings(self.structure, grid)
         if self.contact.periodic:

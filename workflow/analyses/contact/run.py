@@ -106,7 +106,10 @@ def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:
 
 
 def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
-    """Warn of long increments, contacts cut off by the grid, and pressures above yield."""
+    """Warn of long increments, contacts cut off by the grid, and pressures above yield.
+
+    Where yield is followed by a hardness, nothing is said about it.
+    """
     states = outcome.history.states
     _warn_of_increments(outcome, reporter)
     if any(state.border_load > 0.0 for state in states):
@@ -114,8 +117,9 @@ def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
             WarningKind.CONTACT_AT_BORDER,
             "the contact touches the border of its grid and is cut off there: raise contact.size",
         )
-    highest = max(float(state.traction[2].max()) for state in states)
-    reporter.warn_each(yield_warnings(highest, bodies_of(outcome.case)))
+    if outcome.case.contact.hardness is None:
+        highest = max(float(state.traction[2].max()) for state in states)
+        reporter.warn_each(yield_warnings(highest, bodies_of(outcome.case)))
 
 
 def _warn_of_increments(outcome: ContactOutcome, reporter: Reporter) -> None:
