@@ -386,6 +386,8 @@ class FrictionalContact:
         rigid[list(PLANAR)] = before.rigid[list(PLANAR)] + tangential.motion
         resultants = np.array([normal.P, 0.0, 0.0, normal.Mx, normal.My, 0.0])
         resultants[list(PLANAR)] = tangential.Qx, tangential.Qy, tangential.Mz
+        if self.half_space.periodic:
+            resultants[3:] = 0.0  # moments would depend on the middle that is chosen
         messages = [message for message in (normal.message, tangential.message) if message]
         return ContactState(
             traction=np.stack([*tangential.shear, normal.pressure]),

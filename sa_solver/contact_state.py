@@ -189,7 +189,7 @@ class ContactState(TractionState):
         Cells in contact that stick ``(nx, ny)``.
     resultants, rigid
         Resultants (6,) and rigid motions (6,) since the bodies were apart, ordered as in
-        :class:`ContactLoad`.
+        :class:`ContactLoad`. Periodic contacts have no moments.
     energy
         Energy (2,) [N mm] dissipated in the increment along x and y.
     converged

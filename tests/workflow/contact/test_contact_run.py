@@ -274,6 +274,7 @@ def test_a_periodic_patch_has_no_border(tmp_path):
         last.append(summary_of(folder)["states"][-1])
     own, moved = last
     assert own["Qx"] == pytest.approx(210.0, rel=1e-7)
+    assert [moved[name] for name in ("Mx", "My", "Mz")] == [0.0] * 3
     for quantity in ("peak_pressure", "approach", "shift_x", "contact_radius"):
         assert own[quantity] == pytest.approx(moved[quantity], rel=1e-5)
 
