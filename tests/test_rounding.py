@@ -31,7 +31,7 @@ def modules(package, *names):
 # compiled joints and the branches of vibrations would double the time.
 CONTACTS = [
     *modules("sa_solver", "contact", "coupled", "coupled_failures", "friction_limit"),
-    *modules("sa_solver", "gross_slip", "history"),
+    *modules("sa_solver", "gross_slip", "hardness", "history"),
     *modules("sa_solver", "normal", "normal_control", "normal_properties", "partial_slip"),
     *modules("sa_solver", "convergence", "subsurface"),
     *modules("sa_solver", "tangential", "tangential_dense", "tangential_loop"),

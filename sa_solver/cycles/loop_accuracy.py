@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.cycles.tangential_loop import LoopFailure, LoopPath, TangentialLoop, march_loop
-from sa_solver.errors import ContactProblemError
+from sa_solver.errors import ContactProblemError, InputError
 from sa_solver.half_space.nested_grids import GridTransfer
 from sa_solver.types import Array, Grid
 
@@ -54,6 +54,11 @@ def loop_errors(
     loop
         Its result.
 
+    Raises
+    ------
+    InputError
+        For a contact whose friction depends on place or pressure.
+
     Examples
     --------
     For a sphere in partial slip the stiffness differs from that of Mindlin 1949 (J. Appl. Mech. 16,
@@ -74,10 +79,16 @@ def loop_errors(
     >>> print(off < errors.stiffness < 0.1 * loop.stiffness)
     True
     """
+    if contact.factor is not None:
+        raise InputError(
+            "a factor of friction is not known on the coarser grid: compare loops of your own grids"
+        )
     share = 0.5 * OFF * loop.rim / loop.area
     half_space, fine = contact.half_space, contact.grid
     grid = Grid.over(fine.size, _halved(fine.shape), fine.line)
-    coarse = FrictionalContact(half_space.on(grid), contact.friction, contact.tolerance)
+    coarse = FrictionalContact(
+        half_space.on(grid), contact.friction, contact.tolerance, hardness=contact.hardness
+    )
     shorter = replace(path, increments=max(FEWEST_INCREMENTS, path.increments // 2))
     try:
         other = march_loop(coarse, GridTransfer(fine, grid).averaged(height), shorter)

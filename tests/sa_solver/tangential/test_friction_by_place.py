@@ -11,10 +11,13 @@ from sa_solver import (
     Grid,
     HalfSpace,
     InputError,
+    LoopPath,
     Material,
     march_history,
+    march_loop,
     steady_rolling,
 )
+from sa_solver.cycles.loop_accuracy import loop_errors
 from sa_solver.reference.hertz import HertzSphere
 
 STEEL = Material(210e3, 0.3)
@@ -109,3 +112,7 @@ def test_nonsense_is_refused():
     apart, load = found.unloaded_state(HEIGHT), ContactLoad(values, energy=np.ones(2))
     with pytest.raises(InputError, match="energy"):
         found.advance(apart, HEIGHT, load)
+    loop_path = LoopPath(100.0, 10.0, "force", 2)
+    loop = march_loop(found, HEIGHT, loop_path)
+    with pytest.raises(InputError, match="coarser"):
+        loop_errors(found, HEIGHT, loop_path, loop)
