@@ -161,7 +161,7 @@ def _through(layer: Layer, below: Compliances, wave_numbers: Array) -> _Passed:
     cosh, sinh = np.cosh(step), np.sinh(step)
     for _ in range(STEPS):
         motion = upwards[:, :2, :2] @ plane + upwards[:, :2, 2:]
-        back = np.linalg.inv(upwards[:, 2:, :2] @ plane + upwards[:, 2:, 2:])
+        back = _inverse(upwards[:, 2:, :2] @ plane + upwards[:, 2:, 2:])
         plane, passed = motion @ back, passed @ back
         stress = cosh + shear_modulus * sinh * across
         across = (across * cosh + sinh / shear_modulus) / stress
@@ -180,6 +180,13 @@ def _in_plane(compliances: Compliances) -> Array:
         [compliances.coupling, compliances.normal],
     ]
     return -np.moveaxis(np.array(rows), 2, 0)
+
+
+def _inverse(matrices: Array) -> Array:
+    """Return the inverses of ``matrices`` ``(n, 2, 2)``, faster than one after the other."""
+    (a, b), (c, d) = np.moveaxis(matrices, 0, 2)
+    adjugates = np.moveaxis(np.array([[d, -b], [-c, a]]), 2, 0)
+    return np.asarray(adjugates / (a * d - b * c)[:, None, None])
 
 
 def _propagator(poisson: float, shear_modulus: float, distance: Array) -> Array:
