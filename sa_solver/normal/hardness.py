@@ -21,6 +21,7 @@ import numpy as np
 
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.control import NormalContactError, NormalControl
+from sa_solver.normal.problem import border_share, messages
 from sa_solver.normal.state import NormalStart, NormalState
 from sa_solver.types import Array, Grid
 
@@ -72,19 +73,23 @@ def yielding_state(
         start = replace(found.start, pressure=left, displacement=half_space.normal(left))
         convolutions += 1
     settled = np.array_equal(before, yields)
-    message = "" if settled else f"the cells that yield do not settle in {PASSES} passes"
-    force = carried * grid.cell_area
+    failure = "" if settled else f"the cells that yield do not settle in {PASSES} passes"
+    if not found.converged:
+        failure = found.message
+    pressure, force = found.pressure + carried, carried * grid.cell_area
+    border_load = 0.0 if half_space.periodic else border_share(pressure)
     return replace(
         found,
-        pressure=found.pressure + carried,
+        pressure=pressure,
         gap=np.where(before, 0.0, found.gap),
         displacement=found.displacement + moved,
         P=found.P + float(force.sum()),
         Mx=found.Mx + float((force * grid.y).sum()),
         My=found.My - float((force * grid.x).sum()),
         converged=found.converged and settled,
-        message=found.message or message,
+        message=messages(failure, border_load),
         convolutions=convolutions,
+        border_load=border_load,
         flattening=np.where(before, -gap, 0.0),
     )
 

@@ -66,6 +66,19 @@ def test_a_plastic_ball_is_pressed_over_its_load_by_the_hardness():
         assert state.contact_area == pytest.approx(LOAD / hardness, rel=0.01)
 
 
+def test_cells_that_yield_at_the_border_are_told_of():
+    small = Grid.covering((0.2, 0.2), (16, 16))
+    height = (small.x**2 + small.y**2) / 20.0
+    state = contact_on(small).solve(height, P=39.0, hardness=1000.0)
+    yields = state.flattening > 0.0
+    border = np.ones(small.shape, dtype=bool)
+    border[1:-1, 1:-1] = False
+    share = state.pressure[border].sum() / state.pressure.sum()
+    assert (yields & border).any()
+    assert state.border_load == pytest.approx(share)
+    assert "border" in state.message
+
+
 def test_a_high_hardness_changes_nothing():
     contact = contact_on()
     elastic, hard = contact.solve(BALL, P=LOAD), contact.solve(BALL, P=LOAD, hardness=1e5)
