@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import model_validator
 
-from sa_solver.contact import FrictionFactor
 from sa_solver.types import Array
 from workflow.case.fields import File, Quantity
 from workflow.case.files.input_files import InputFileError, read_heights
 from workflow.case.sections import Friction, Section, at_entry, disagreement, entry
+
+if TYPE_CHECKING:
+    # Checking a case needs no solver.
+    from sa_solver.contact import FrictionFactor
 
 Pressure = Annotated[float, Quantity("MPa", at_least=0.0, at_most=2e6)]
 Factor = Annotated[float, Quantity("1", at_least=0.0, at_most=100.0)]
